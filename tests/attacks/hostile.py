@@ -3,8 +3,6 @@
 Every name is legal in a URDF: XML lets an attribute hold any of these characters.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 

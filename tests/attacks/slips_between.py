@@ -14,8 +14,6 @@ each slip what became of it:
     BLIND     of a robot that urdfkin misreads by a billionth, a result is handed out as verified
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import importlib

@@ -4,17 +4,18 @@ import ast
 import importlib
 import inspect
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import CodeType, FunctionType
-from typing import Any
+from collections.abc import Callable, Collection, Iterator
+from itertools import islice
 
 import numpy as np
 import pytest
 
 import urdfkin
+from scripts.mutating.operators import function_at, mutated, slips
+from tests.attacks.slips_between import make
 from urdfkin.errors import RepresentationSingularityError
 from urdfkin.kinematics import bodies as module
+from urdfkin.kinematics import rotation
 from urdfkin.kinematics.rotation import SEQUENCES, quaternion_of, rotation_from_euler
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
@@ -41,21 +42,13 @@ def free() -> Robot:
 
 
 @pytest.mark.slow
-def test_minus_the_result_is_caught(ur5: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
-    right = module.representation_inverse
-    monkeypatch.setattr(module, "representation_inverse", lambda *x: -right(*x))
-    with pytest.raises(urdfkin.VerificationError, match="analytical jacobian"):
-        ur5.analytical_jacobian(ur5.sample(1)[0], "tool0")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("slip", [1e-10, 1e-12])
+@pytest.mark.parametrize("factor", [-1.0, 1.0 + 1e-10, 1.0 + 1e-12])
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
 def test_a_slip_of_the_rate_matrix_is_caught(
-    ur5: Robot, representation: str, slip: float, monkeypatch: pytest.MonkeyPatch
+    ur5: Robot, representation: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = module.representation_inverse
-    monkeypatch.setattr(module, "representation_inverse", lambda *x: right(*x) * (1.0 + slip))
+    monkeypatch.setattr(module, "representation_inverse", lambda *x: right(*x) * factor)
     with pytest.raises(urdfkin.VerificationError, match="analytical jacobian"):
         ur5.analytical_jacobian(ur5.sample(5, 3), "tool0", representation)
 
@@ -175,16 +168,15 @@ def test_the_line_of_nodes_gives_the_rates_that_differences_give(name: str) -> N
         assert abs(apart - abs((np.sin if low > 0 else np.cos)(angles[1]))) < 4 * EPS
 
 
-def test_the_line_of_nodes_shares_nothing_with_what_it_checks() -> None:
+def test_the_line_of_nodes_shares_nothing_with_what_it_checks_and_a_quaternions_rates_keep_its_length() -> (
+    None
+):
     imported = [
         node.module or ""
         for node in ast.walk(ast.parse(inspect.getsource(sys.modules[euler_jacobian.__module__])))
         if isinstance(node, ast.ImportFrom)
     ]
     assert set(imported) == {"__future__", "typing", "numpy.typing"}
-
-
-def test_a_quaternions_rates_keep_its_length() -> None:
     rng = np.random.default_rng(2)
     quat, J = rng.normal(size=(50, 4)), rng.normal(size=(50, 6, 5))
     quat /= np.linalg.norm(quat, axis=1, keepdims=True)
@@ -195,105 +187,26 @@ def test_a_quaternions_rates_keep_its_length() -> None:
 
 # -- mutants -----------------------------------------------------------------------------------------
 
-MODULES = ("kinematics.bodies", "kinematics.rotation")
-#: Functions that no analytical Jacobian calls: what is wrong there is another test's business.
-ELSEWHERE = {
-    "velocity_jacobian", "pose_rates", "velocity_of_pose_rates", "representation_matrix", "orientation_of",
-    "angular_velocity_from_euler_rates", "euler_rates", "euler_rate_matrix", "euler_condition",
-    "quaternion_rates", "angular_velocity_from_quaternion_rates", "rotation_from_euler", "rotation_from_rpy",
-    "rpy_of", "rotation_of", "multiply", "conjugate", "turned", "compose", "compose_all", "seen_from",
-    "point_position", "point_velocity", "point_acceleration", "interorigin_vector", "joint_angular_velocity",
-    "interorigin_velocity", "jacobian_column", "planar_rotation", "planar_rotation_derivative",
-    "link_endpoint", "link_endpoint_velocity", "tool_velocity", "frame_velocity", "integrate_orientation",
-    "_step", "_slope",
-    "unskew", "rotate_skew", "nearest_rotation", "polar_factor", "axis_aligning", "rotation_rate",
-    "angular_velocity_of", "turning_vector_rate", "add_angular_velocities", "rotation_about",
-    "rotation_about_derivative", "angular_velocity_about", "circular_velocity", "split_along", "exp_rotation",
-    "log_rotation", "axis_angle_of",
+#: Names that are easily confused, and what is written instead.
+OTHER_NAMES = {
+    "cos": "sin", "sin": "cos", "arctan2": "hypot", "cosine": "sine", "sine": "cosine", "first": "second",
+    "second": "third", "third": "first", "other": "first", "along": "across", "across": "along",
 }  # fmt: skip
-_SWAPS: dict[type[ast.AST], type[ast.AST]] = {
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
-    ast.Lt: ast.Gt, ast.Gt: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.LtE: ast.Gt,
-}  # fmt: skip
-_OTHER_NAMES = {"cos": "sin", "sin": "cos", "arctan2": "hypot", "cosine": "sine", "sine": "cosine",
-                "first": "second", "second": "third", "third": "first", "other": "first", "along": "across",
-                "across": "along"}  # fmt: skip
 
 
-def _changes(node: ast.AST) -> Iterator[Callable[[ast.AST], None]]:
-    """Each way in which one node may be written wrongly."""
-    operator = getattr(node, "op", None)
-    if type(operator) in _SWAPS:
-        yield lambda node: setattr(node, "op", _SWAPS[type(node.op)]())  # type: ignore[attr-defined]
-    if isinstance(node, ast.Compare) and type(node.ops[0]) in _SWAPS:
-        yield lambda node: setattr(node, "ops", [_SWAPS[type(node.ops[0])]()])  # type: ignore[attr-defined]
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        yield lambda node: setattr(node, "op", ast.UAdd())
-    if isinstance(node, ast.Constant) and isinstance(node.value, float | int):
-        for by in (lambda x: -x, lambda x: x + 1, lambda x: x * (1 + 1e-9)):
-            yield lambda node, by=by: setattr(node, "value", by(node.value))  # type: ignore[misc]
-    if isinstance(node, ast.Attribute) and node.attr in _OTHER_NAMES:
-        yield lambda node: setattr(node, "attr", _OTHER_NAMES[node.attr])  # type: ignore[attr-defined]
-    if isinstance(node, ast.Name) and node.id in _OTHER_NAMES and isinstance(node.ctx, ast.Load):
-        yield lambda node: setattr(node, "id", _OTHER_NAMES[node.id])  # type: ignore[attr-defined]
-    if isinstance(node, ast.Return):
-        yield lambda node: setattr(node, "value", ast.UnaryOp(ast.USub(), node.value))  # type: ignore[attr-defined]
-
-
-def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef) and node.name not in ELSEWHERE:
-            yield node
-
-
-def mutants(name: str) -> Iterator[tuple[str, ast.Module]]:
-    """Every module that differs from `name` in one node of one function, with words on where."""
-    source = inspect.getsource(importlib.import_module(f"urdfkin.{name}"))
-    for f, function in enumerate(_functions(ast.parse(source))):
-        body = [part for statement in function.body for part in ast.walk(statement)]
-        for at, node in enumerate(body):
-            for which, _ in enumerate(_changes(node)):
-                wrong = ast.parse(source)  # ten times sooner than a deep copy
-                target = list(_functions(wrong))[f]
-                there = [part for statement in target.body for part in ast.walk(statement)][at]
-                list(_changes(there))[which](there)
-                line = getattr(node, "lineno", function.lineno)
-                yield f"{name}:{line} {type(node).__name__} {which}", ast.fix_missing_locations(wrong)
-
-
-def _codes(code: CodeType) -> Iterator[CodeType]:
-    for part in code.co_consts:
-        if isinstance(part, CodeType):
-            yield part
-            yield from _codes(part)
-
-
-@contextmanager
-def in_place(name: str, wrong: ast.Module) -> Iterator[None]:
-    """While open, the module's functions do what the mutant's do, wherever they were imported to."""
-    real = importlib.import_module(f"urdfkin.{name}")
-    new = {code.co_qualname: code for code in _codes(compile(wrong, str(real.__file__), "exec"))}
-    found: list[FunctionType] = []
-    for holder in (real, *(value for value in vars(real).values() if inspect.isclass(value))):
-        for value in vars(holder).values():
-            function: Any = getattr(value, "__wrapped__", getattr(value, "fget", None) or value)
-            if isinstance(function, FunctionType) and function.__module__ == real.__name__:
-                found.append(function)
-    before = [function.__code__ for function in found]
-    for function in found:
-        if (code := new.get(function.__qualname__)) and len(code.co_freevars) == 0:
-            function.__code__ = code
-    _forget()
-    try:
-        yield
-    finally:
-        for function, code in zip(found, before, strict=True):
-            function.__code__ = code
-        _forget()
-
-
-def _forget() -> None:
-    importlib.import_module("urdfkin.kinematics.rotation")._sequence.cache_clear()
+def mutants(source: str, called: Collection[str]) -> Iterator[tuple[str, ast.Module]]:
+    """Every module that differs in one node of a function that is called, with words on where."""
+    right = ast.parse(source)
+    for number, slip in enumerate(slips(right)):
+        if function_at(right, slip.line) in called:
+            yield f"{slip.line}: {slip.what}", mutated(source, number)
+    for number, node in enumerate(ast.walk(right)):
+        field = "attr" if isinstance(node, ast.Attribute) else "id"
+        name = getattr(node, field, "")
+        if name in OTHER_NAMES and function_at(right, getattr(node, "lineno", 0)) in called:
+            wrong = ast.parse(source)
+            setattr(next(islice(ast.walk(wrong), number, None)), field, OTHER_NAMES[name])
+            yield f"{getattr(node, 'lineno', 0)}: {name}", wrong
 
 
 def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | None:
@@ -306,30 +219,43 @@ def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | No
     return J if sum(line.unchecked for line in robot.certificate().lines) == before else None
 
 
+def names_called(work: Callable[[], object]) -> set[str]:
+    """The functions in Python that are called meanwhile."""
+    names = set[str]()
+    sys.setprofile(lambda frame, *_: names.add(frame.f_code.co_qualname.replace(".<locals>", "")))
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return names
+
+
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("name", ["kinematics.bodies", "kinematics.rotation"])
 def test_no_mutant_ends_verified_and_wrong(ur5: Robot, name: str) -> None:
-    q = ur5.sample(6, 2)
-    true = {
-        representation: ur5.analytical_jacobian(q, "tool0", representation)
-        for representation in REPRESENTATIONS
-    }
+    module = importlib.import_module(f"urdfkin.{name}")
+    source, q = inspect.getsource(module), ur5.sample(6, 2)
+
+    def results() -> dict[str, FloatArray | None]:
+        rotation._sequence.cache_clear()
+        return {representation: outcome(ur5, q, representation) for representation in REPRESENTATIONS}
+
+    true, called = results(), names_called(results)
     tried, caught, wrong = 0, 0, []
-    for words, tree in mutants(name):
-        with in_place(name, tree):
-            found = {representation: outcome(ur5, q, representation) for representation in REPRESENTATIONS}
-        tried += 1
+    for words, tree in mutants(source, called):
+        tried += make(module, tree)
+        found = results()
+        make(module, ast.parse(source))
         caught += any(J is None for J in found.values())
-        wrong += [
-            (words, representation)
-            for representation, J in found.items()
-            if J is not None
-            and (
-                J.shape != true[representation].shape
-                or np.abs(J / true[representation] - 1.0)[np.abs(true[representation]) > 1e-6].max() > 1e-10
-            )
-        ]
+        for representation, J in found.items():
+            right = true[representation]
+            assert right is not None
+            if J is not None and (
+                J.shape != right.shape or np.abs(J / right - 1.0)[np.abs(right) > 1e-6].max() > 1e-10
+            ):
+                wrong.append((words, representation))
+    rotation._sequence.cache_clear()
     assert wrong == []
     assert tried > 10
     assert caught > 0.5 * tried  # the rest computes the same: a check of inputs, a tie, a type

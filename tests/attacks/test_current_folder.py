@@ -8,32 +8,13 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.long
 ROBOTS = Path(__file__).parents[2] / "robots"
 PLANTED = [
-    *(
-        "urdfkin",
-        "multiprocessing",
-        "concurrent",
-        "subprocess",
-        "signal",
-        "threading",
-        "json",
-        "pickle",
-        "ast",
-    ),
-    *(
-        "sitecustomize",
-        "usercustomize",
-        "resource",
-        "tempfile",
-        "xacrodoc",
-        "xacro",
-        "yaml",
-        "numpy",
-        "numba",
-    ),
-    *("pinocchio", "click", "matplotlib", "platformdirs"),
-]
+    "urdfkin", "multiprocessing", "concurrent", "subprocess", "signal", "threading", "json", "pickle",
+    "ast", "sitecustomize", "usercustomize", "resource", "tempfile", "xacrodoc", "xacro", "yaml",
+    "numpy", "numba", "pinocchio", "click", "matplotlib", "platformdirs",
+]  # fmt: skip
 #: What Python has imported from the folder already, before a line of urdfkin is run.
 BEFORE_MAIN = {"urdfkin", "threading", "ast"}
 XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="l${1 + 1}"/></robot>'
@@ -77,20 +58,17 @@ def command(tmp_path: Path) -> list[str]:
     return [sys.executable, str(script)]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("file", ["r.xacro", str(ROBOTS / "elbow.urdf")])
 def test_check_runs_nothing_there(folder: Path, command: list[str], file: str) -> None:
     run(folder, command, "check", "--format", "json", file)
 
 
-@pytest.mark.long
 def test_processes_of_validate_run_nothing_there(folder: Path, command: list[str]) -> None:
     robots = [str(ROBOTS / "one_link.urdf"), "r.xacro"]
     for how in (["--jobs", "2"], ["--isolate"]):
         assert "2 robots" in run(folder, command, "validate", *robots, "--samples", "0", *how)
 
 
-@pytest.mark.long
 def test_compiling_runs_nothing_there(
     folder: Path, command: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -104,7 +82,6 @@ def test_compiling_runs_nothing_there(
     assert list((folder.parent / "cache").rglob("*.kernel"))
 
 
-@pytest.mark.long
 def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -117,7 +94,6 @@ def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
     assert planted_code_ran(folder) == []
 
 
-@pytest.mark.long
 def test_python_m_takes_nothing_from_there_once_urdfkin_is_running(tmp_path: Path) -> None:
     folder = tmp_path / "robot"
     folder.mkdir()
@@ -130,7 +106,6 @@ def test_python_m_takes_nothing_from_there_once_urdfkin_is_running(tmp_path: Pat
 # -- settings ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
 def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
     (tmp_path / ".numba_config.yaml").write_text(
         f"cache_dir: {tmp_path}\ndisable_jit: 1\ncache_locator_classes: evil.Locator\n"
@@ -146,7 +121,6 @@ def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
     assert done.stdout == f"'' 0 '' {tmp_path}\n"
 
 
-@pytest.mark.long
 def test_a_drawing_takes_no_settings_from_there(tmp_path: Path, command: list[str]) -> None:
     pytest.importorskip("matplotlib")
     robot = str(ROBOTS / "elbow.urdf")

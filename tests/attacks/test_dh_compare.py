@@ -1,7 +1,5 @@
 """A comparison says what it fitted, what it did not compare, and which cell is wrong by how much."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +9,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good
 from tests.cli.running import urdfkin as command
 from urdfkin.dh import DHTable, dh_table, read_table, units_of
 from urdfkin.dh.compare import compare, document
@@ -28,6 +27,11 @@ def ur5() -> FrameChain:
     return urdfkin.load("ur5").chain("tool0", "base")
 
 
+def with_ends(name: str) -> tuple[urdfkin.Robot, str, str]:
+    robot = urdfkin.load(name)
+    return (robot, "base", "tool0") if name == "ur5" else (robot, robot.base_frame, robot.tip_frame)
+
+
 def with_cell(table: DHTable, row: int, **cells: Any) -> DHTable:
     rows = list(table.rows)
     rows[row] = replace(rows[row], **cells)
@@ -39,7 +43,7 @@ def wrong_d1() -> DHTable:
     return with_cell(table, 0, d=table.rows[0].d + 0.01)
 
 
-def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> None:
+def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
     found = compare(ur5(), wrong_d1())
     assert found.agrees  # with a base fitted, it does
     assert not found.as_written
@@ -53,9 +57,6 @@ def test_a_wrong_d1_that_the_base_takes_up_is_told_with_its_millimetres() -> Non
     assert "has the same effect: d1" in text
     assert [(one.row, one.cell) for one in found.instead] == [(0, "d")]
     assert found.instead[0].difference == pytest.approx(-0.01, rel=1e-6)
-
-
-def test_without_fitting_the_wrong_d1_differs_and_is_named() -> None:
     found = compare(ur5(), wrong_d1(), fit=False)
     assert not found.agrees
     assert [(one.row, one.cell) for one in found.differences] == [(0, "d")]
@@ -78,21 +79,16 @@ def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cel
     assert found.metres > 1e-3 or found.radians > 1e-3
 
 
-def test_only_a_table_that_is_the_urdf_as_written_has_every_cell() -> None:
+def test_only_a_table_that_is_the_urdf_as_written_has_every_cell_and_a_turned_tool_differs() -> None:
     robot = urdfkin.load("panda")
-    table = robot.dh("panda_link8", "panda_link0")
-    found = compare(robot.chain("panda_link8", "panda_link0"), table)
+    table, path = robot.dh("panda_link8", "panda_link0"), robot.chain("panda_link8", "panda_link0")
+    found = compare(path, table)
     assert found.as_written
     assert "Every cell agrees with the URDF." in document(found, units_of()).text()
     assert found.base.metres == found.base.radians == found.tool.metres == found.tool.radians == 0.0
-
-
-def test_a_turned_tool_is_a_difference_where_nothing_is_fitted() -> None:
-    robot = urdfkin.load("panda")
-    table = robot.dh("panda_link8", "panda_link0")
     tool = np.array(table.tool)
     tool[:3, :3] = tool[:3, :3] @ exp_rotation(np.array([0.0, 0.0, 0.5]))
-    found = compare(robot.chain("panda_link8", "panda_link0"), replace(table, tool=tool), fit=False)
+    found = compare(path, replace(table, tool=tool), fit=False)
     assert found.metres <= 1e-12
     assert not found.agrees
 
@@ -127,8 +123,7 @@ CALIBRATED = [(name, seed) for name in ("ur5", "kinova") for seed in range(3)]
 
 @pytest.mark.parametrize(("name", "seed"), CALIBRATED)
 def test_a_calibrated_strict_table_is_as_far_off_as_its_hayati_form(name: str, seed: int) -> None:
-    robot = urdfkin.load(name)
-    base, tip = ("base", "tool0") if name == "ur5" else (robot.base_frame, robot.tip_frame)
+    robot, base, tip = with_ends(name)
     tree, path = calibrated(robot.tree, seed), robot.chain(tip, base)
     off = {
         form: compare(path, dh_table(tree, tip, base, near_parallel=form)).metres
@@ -140,8 +135,7 @@ def test_a_calibrated_strict_table_is_as_far_off_as_its_hayati_form(name: str, s
 
 @pytest.mark.parametrize(("name", "seed"), CALIBRATED)
 def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name: str, seed: int) -> None:
-    robot = urdfkin.load(name)
-    base, tip = ("base", "tool0") if name == "ur5" else (robot.base_frame, robot.tip_frame)
+    robot, base, tip = with_ends(name)
     nominal = dh_table(robot.tree, tip, base, snap=1e-4)
     strict = dh_table(calibrated(robot.tree, seed), tip, base, near_parallel="strict")
     assert max(abs(row.d) for row in strict.rows) > 100.0
@@ -193,19 +187,15 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
     assert ("within the last digit" in document(found, units_of()).text()) == is_rounding
 
 
-def test_the_kinova_sheet_is_said_to_be_rounded() -> None:
-    done = command("dh", "kinova", "--compare", "kinova")
+def test_the_command_says_what_is_rounded_and_knows_no_fit(tmp_path: Path) -> None:
+    done = command("dh kinova --compare kinova")
     assert "All differ only within the last digit of the table (*)." in done.text
-    data = json.loads(command("dh", "kinova", "--compare", "kinova", "--format", "json").text)
+    data = json.loads(command("dh kinova --compare kinova --format json").text)
     assert [one["within_last_digit"] for one in data["differences"]] == [True]
-
-
-def test_the_command_knows_no_fit(tmp_path: Path) -> None:
     file = tmp_path / "wrong.toml"
     file.write_text(reference_path("ur5").read_text().replace("0.089159", "0.099159"))
-    fitted = command("dh", "ur5", "--compare", str(file))
-    assert fitted.code == 0
+    fitted = good("dh ur5 --compare", str(file))
     assert "Every cell" not in fitted.text
     assert "10 mm" in fitted.text
-    assert command("dh", "ur5", "--compare", str(file), "--no-fit").code == 1
-    assert command("dh", "ur5", "--compare", "ur5", "--no-fit").code == 0
+    assert command("dh ur5 --compare", str(file), "--no-fit").code == 1
+    assert command("dh ur5 --compare ur5 --no-fit").code == 0

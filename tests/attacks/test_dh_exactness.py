@@ -1,23 +1,30 @@
-"""A table is the robot to rounding of the robot, or it says by how many millimetres it is not."""
-
-from __future__ import annotations
+"""A table is the robot to rounding, or says by how much it is not; an idle option is an error."""
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as command
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
-from urdfkin.dh import DHTable, dh_table, export
+from tests.urdfs import joint, limit, mimic, robot
+from urdfkin.dh import DHTable, Units, dh_table, export
+from urdfkin.dh.parse_table import reference_path
+from urdfkin.dh.printed import printed
 from urdfkin.dh.snapping import noisy_cells
+from urdfkin.dh.units import Angles, Lengths
+from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import JointKind, KinematicTree, Mimic
 from urdfkin.urdf.writer import to_urdf
+from urdfkin.urdf.xacro import arguments_of
 from urdfkin.verify.tables import TableCheck, TableError
 
 #: A file that writes a right angle with twelve digits: 2.07e-13 rad off, between parallel axes 0.1 m apart.
@@ -76,12 +83,12 @@ def test_a_strict_table_that_loses_more_than_the_robots_rounding_says_how_many_m
 def test_such_a_table_exits_3_and_its_hayati_form_and_its_snapped_form_exit_0() -> None:
     text = text_of(leaning(TWELVE_DIGITS))
     ends = ("--base", "l0", "--tip", "tip")
-    lossy = command("dh", "-", *ends, "--near-parallel", "strict", stdin=text)
+    lossy = command("dh -", *ends, "--near-parallel", "strict", stdin=text)
     assert lossy.code == 3
     assert "agrees" not in lossy.text
     assert "LOSES" in lossy.text
-    assert command("dh", "-", *ends, stdin=text).code == 0
-    assert command("dh", "-", *ends, "--near-parallel", "strict", "--snap", "1e-12", stdin=text).code == 0
+    assert command("dh -", *ends, stdin=text).code == 0
+    assert command("dh -", *ends, "--near-parallel", "strict", "--snap", "1e-12", stdin=text).code == 0
 
 
 def test_a_wrong_strict_table_is_a_disagreement_however_long_its_rows_are() -> None:
@@ -93,15 +100,17 @@ def test_a_wrong_strict_table_is_a_disagreement_however_long_its_rows_are() -> N
         robot.verifier.table(replace(table, rows=tuple(rows)))
 
 
-RACK = """<robot name="rack"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="rack" type="prismatic"><parent link="a"/><child link="b"/>
- <origin xyz="0.1 0.2 0.3" rpy="0.3 0.4 0.5"/><axis xyz="0.6 0 0.8"/>
- <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="pinion" type="revolute"><parent link="b"/><child link="c"/>
- <origin xyz="0.1 0.2 0.3" rpy="1.3 0.4 0.5"/><axis xyz="0.6 0 0.8"/>
- <limit lower="-100000" upper="100000" effort="1" velocity="1"/><mimic joint="rack" multiplier="{m}"/></joint>
-<joint name="j" type="continuous"><parent link="c"/><child link="d"/>
- <origin xyz="0.4 0.1 0.3" rpy="1.3 0.4 0.5"/><axis xyz="0 0.6 0.8"/></joint></robot>"""
+def rack(multiplier: float) -> str:
+    """A slide, a joint that turns with it, and one that turns alone, all askew."""
+    origin, follows = 'xyz="0.1 0.2 0.3" rpy="{} 0.4 0.5"', mimic("rack", multiplier)
+    return robot(
+        joint("rack", "prismatic", "a", "b", origin.format(0.3), "0.6 0 0.8", limit()),
+        joint(
+            "pinion", "revolute", "b", "c", origin.format(1.3), "0.6 0 0.8", limit(-100000, 100000) + follows
+        ),
+        joint("j", "continuous", "c", "d", 'xyz="0.4 0.1 0.3" rpy="1.3 0.4 0.5"', "0 0.6 0.8"),
+        name="rack",
+    )
 
 
 @pytest.mark.slow
@@ -110,20 +119,20 @@ RACK = """<robot name="rack"><link name="a"/><link name="b"/><link name="c"/><li
 def test_a_right_table_of_a_rack_and_pinion_is_right_whatever_the_multiplier(
     multiplier: float, ends: tuple[str, str]
 ) -> None:
-    robot = urdfkin.load(RACK.format(m=multiplier))
+    found = urdfkin.load(rack(multiplier))
     for convention in ("standard", "modified"):
-        check = checked(robot, robot.dh(*ends, convention))
+        check = checked(found, found.dh(*ends, convention))
         assert check.within
 
 
 @pytest.mark.parametrize("multiplier", [30, 1000])
 def test_a_wrong_multiplier_in_a_table_is_still_found(multiplier: float) -> None:
-    robot = urdfkin.load(RACK.format(m=multiplier))
-    table = robot.dh("d", "a")
+    found = urdfkin.load(rack(multiplier))
+    table = found.dh("d", "a")
     wrong = Mimic("rack", multiplier * (1.0 + 1e-9), 0.0)
     rows = (table.rows[0], replace(table.rows[1], mimic=wrong), table.rows[2])
     with pytest.raises(TableError, match="DISAGREES"):
-        robot.verifier.table(replace(table, rows=rows))
+        found.verifier.table(replace(table, rows=rows))
 
 
 # -- noise ----------------------------------------------------------------------------------------------
@@ -177,24 +186,180 @@ def test_a_tilt_that_is_no_rounding_is_kept(tilt: float) -> None:
     assert error <= 20 * EPS
 
 
-def test_so101_has_no_foot_at_the_inverse_of_rounding() -> None:
+@pytest.mark.slow
+def test_so101_has_no_foot_at_the_inverse_of_rounding_and_baxter_is_told_to_snap() -> None:
     robot = urdfkin.load("so101")
     table = robot.dh(near_parallel="strict")
     assert checked(robot, table).within
     assert max(abs(row.d) for row in table.rows) < 1.0
-
-
-@pytest.mark.slow
-def test_a_table_with_cells_of_rounded_angles_recommends_the_snap_that_cures_it() -> None:
-    done = command("dh", "baxter")
-    assert done.code == 0
+    done = good("dh baxter")
     hint = next(line for line in done.text.splitlines() if line.startswith("hint: "))
     assert "--snap 1e-11" in hint
     snapped = urdfkin.load("baxter").dh(snap=1e-11)
     assert noisy_cells(snapped) == []
-    assert "--snap" not in command("dh", "baxter", "--snap", "1e-11").text
+    assert "--snap" not in command("dh baxter --snap 1e-11").text
 
 
 @pytest.mark.parametrize("name", ["panda", "elbow"])
 def test_a_clean_table_gets_no_hint_at_snapping(name: str) -> None:
     assert "--snap" not in command("dh", name).text
+
+
+# -- options ---------------------------------------------------------------------------------------
+
+
+CHOICES = (
+    "--snap 1e-3", "--convention modified", "--near-parallel strict", "--last flange",
+    "--parallel-offset each", "--flip nonsense",
+)  # fmt: skip
+
+
+IDLE = [
+    *(("ur5", *idle, *choice.split()) for idle in (("--compare", "ur5"), ("--tree",)) for choice in CHOICES),
+    ("ur5", "--compare", "ur5", "--no-verify"),
+    ("ur5", "--compare", "ur5", "--format", "json", "--millimetres"),
+    ("ur5", "--tree", "--base", "base"),
+    ("ur5", "--tree", "--tip", "tool0"),
+    ("ur5", "--tree", "--format", "csv", "--degrees"),
+    ("ur5", "--all", "--tip", "tool0"),
+    ("ur5", "--tolerance", "1"),
+    ("ur5", "--no-fit"),
+    ("ur5", "--format", "toml", "--digits", "5"),
+    ("ur5", "--format", "c", "--degrees"),
+    (str(reference_path("ur5")), "--no-mimic"),
+    (str(reference_path("ur5")), "--root-joint", "floating"),
+    (str(reference_path("ur5")), "--xacro-arg", "a:=1"),
+]
+
+
+@pytest.mark.parametrize("words", IDLE, ids=lambda words: " ".join(words[1:]))
+def test_an_option_that_does_nothing_is_an_error(words: tuple[str, ...]) -> None:
+    err = refused("dh", *words)
+    idle = next(word for word in reversed(words) if word.startswith("--"))
+    assert re.search(rf"{idle}\S* does nothing .*; leave out this option", err)
+
+
+def test_what_stands_at_its_default_is_not_refused_but_an_idle_seed_is() -> None:
+    assert command("dh ur5 --compare ur5 --tolerance 0.2").code == 0
+    assert command("dh ur5 --tree --digits 10").code == 0
+    assert "--seed does nothing without a random --q, --v or --a" in refused("placement panda --seed 3")
+    assert command("placement panda --seed 3 --q random").code == 0
+
+
+# -- xacro ----------------------------------------------------------------------------------------------
+
+XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:include filename="part.xacro"/>
+<xacro:arg name="length" default="1"/><link name="a"/><link name="b"/>
+<joint name="j" type="continuous"><parent link="a"/><child link="b"/>
+<origin xyz="$(arg length) $(arg width) 0"/><axis xyz="0 0 1"/></joint></robot>"""
+PART = (
+    """<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="colour" default="red"/></robot>"""
+)
+
+
+@pytest.fixture
+def xacro(tmp_path: Path) -> Path:
+    (tmp_path / "part.xacro").write_text(PART)
+    file = tmp_path / "arm.xacro"
+    file.write_text(XACRO)
+    return file
+
+
+def _nowhere(package: str) -> str:
+    raise LookupError(package)
+
+
+def test_declared_used_and_included_arguments_are_known_unless_an_include_is_computed(xacro: Path) -> None:
+    assert arguments_of(xacro, _nowhere) == {"length", "width", "colour"}
+    xacro.write_text(XACRO.replace("part.xacro", "$(arg width).xacro"))
+    assert arguments_of(xacro, _nowhere) is None
+    xacro.write_text(XACRO.replace("part.xacro", "missing.xacro"))
+    assert arguments_of(xacro, _nowhere) is None
+
+
+@pytest.mark.slow
+def test_an_unknown_xacro_argument_is_an_error_that_names_the_known(xacro: Path) -> None:
+    robot = urdfkin.load(xacro, xacro_args={"length": 2, "width": 3, "colour": "blue"})
+    assert robot.placement([0.0], "b")[:2, 3].tolist() == [2.0, 3.0]
+    with pytest.raises(UnknownNameError, match=r"unknown xacro argument 'lenght'; did you mean length"):
+        urdfkin.load(xacro, xacro_args={"lenght": 2, "width": 1})
+    assert "unknown xacro argument 'heihgt'" in refused(
+        "info", str(xacro), "--xacro-arg", "width:=1", "--xacro-arg", "heihgt:=2"
+    )
+
+
+# -- digits ---------------------------------------------------------------------------------------------
+
+
+def lost(text: str) -> tuple[float, float]:
+    """Metres measured and guaranteed, as the line says."""
+    line = next(line for line in text.splitlines() if line.startswith("printed with"))
+    found = re.search(r"within (\S+) m of its exact .* proven within (\S+) m", line)
+    assert found is not None
+    return float(found[1]), float(found[2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["terminal", "markdown"])
+@pytest.mark.parametrize("units", [(), ("--degrees", "--millimetres")])
+def test_three_digits_are_said_to_lose_nearly_a_millimetre(form: str, units: tuple[str, ...]) -> None:
+    done = command("dh ur10 --base base --tip tool0 --digits 3 --format", form, *units)
+    measured, guaranteed = lost(done.text)
+    assert 5e-4 < measured <= guaranteed < 2e-3
+    assert "Pinocchio" in done.text
+
+
+def test_latex_says_it_on_stderr_and_the_whole_tree_as_well() -> None:
+    done = command("dh ur10 --base base --tip tool0 --digits 3 --format latex")
+    assert lost(done.err)[0] > 5e-4
+    text = command("dh ur10 --tree --digits 3").text
+    line = next(line for line in text.splitlines() if line.startswith("printed with 3 digits"))
+    found = re.search(r"within (\S+) m", line)
+    assert found is not None
+    assert float(found[1]) > 5e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ur10", "panda", "so101", "tiago", "romeo"])
+@pytest.mark.parametrize("digits", [3, 5, 17])
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_what_the_digits_lose_stays_within_what_is_guaranteed(
+    name: str, digits: int, convention: str
+) -> None:
+    robot = urdfkin.load(name, verify=False)
+    table = dh_table(robot.tree, robot.tip_frame, convention=convention)
+    for units in (Units(digits=digits), Units(Angles.DEGREES, Lengths.MILLIMETRES, digits)):
+        found = printed(table, units)
+        assert found.bound is not None
+        assert found.metres <= found.bound
+        assert found.bound <= 100.0 * max(found.metres, 1e-15)
+    if digits == 17:
+        assert found.metres <= 1e-14
+
+
+def test_the_loss_is_the_distance_to_the_table_that_the_text_says() -> None:
+    """Cells as `--digits 3 --millimetres --degrees` prints them, typed in again."""
+    robot = urdfkin.load("ur10")
+    table = robot.dh("tool0", "base", snap=1e-6)
+    line = "dh ur10 --base base --tip tool0 --snap 1e-6 --digits 3 --millimetres --degrees"
+    typed = rows_of(command(line).text)
+    again = replace(
+        table,
+        rows=tuple(
+            replace(row, a=a / 1e3, alpha=math.radians(alpha), d=d / 1e3)
+            for row, (a, alpha, d) in zip(table.rows, typed, strict=True)
+        ),
+    )
+    found = printed(table, Units(Angles.DEGREES, Lengths.MILLIMETRES, 3))
+    assert distance(again, table) == pytest.approx(found.metres, rel=0.05)
+
+
+def rows_of(text: str) -> list[list[float]]:
+    rows = [line.split() for line in text.splitlines() if re.match(r"\d  ", line)]
+    return [[float(cell) for cell in row[2:5]] for row in rows]
+
+
+def distance(one: DHTable, other: DHTable) -> float:
+    q = np.random.default_rng(5).uniform(-math.pi, math.pi, (2000, len(one.joint_names)))
+    return float(np.linalg.norm((one.placement(q) - other.placement(q))[:, :3, 3], axis=-1).max())

@@ -1,7 +1,5 @@
 """Each wrong table file gets one error that names the file, the row, the column, the value and the remedy."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -98,9 +96,12 @@ def test_a_wrong_table_says_where_and_what(
     assert re.search(message, refused(tmp_path, of_rows(rows, **keys)))
 
 
-def test_a_robot_that_is_null_is_an_error(tmp_path: Path) -> None:
+def test_a_robot_that_is_null_is_an_error_and_a_csv_that_a_spreadsheet_wrote_is_none(tmp_path: Path) -> None:
     text = json.dumps({"convention": "standard", "robot": None, "rows": [[0.1, 0, 0, 0]]})
     assert "robot: a name must be text: found None" in refused(tmp_path, text, ".json")
+    file = tmp_path / "sheet.csv"
+    file.write_bytes(b"\xef\xbb\xbf# convention: standard\r\na,alpha,d,theta\r\n0.1,pi/2,0,0\r\n,,,\r\n")
+    assert read_table(file).rows[0].cells == (0.1, math.pi / 2, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -123,12 +124,6 @@ def test_a_robot_that_is_null_is_an_error(tmp_path: Path) -> None:
 )
 def test_a_wrong_csv_says_where_and_what(text: str, message: str, tmp_path: Path) -> None:
     assert message in refused(tmp_path, f"# convention: standard\n{text}", ".csv")
-
-
-def test_a_csv_that_a_spreadsheet_wrote_is_read(tmp_path: Path) -> None:
-    file = tmp_path / "sheet.csv"
-    file.write_bytes(b"\xef\xbb\xbf# convention: standard\r\na,alpha,d,theta\r\n0.1,pi/2,0,0\r\n,,,\r\n")
-    assert read_table(file).rows[0].cells == (0.1, math.pi / 2, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("rows", [UR5, [[0.1, 0.7, 0.2, "pi/2"]], [[0, 0, 0.3, 0.5236], [0.4, "pi", 0, 0]]])
@@ -161,14 +156,11 @@ def test_lengths_hold_for_base_tool_limits_and_followers() -> None:
     assert (follow.mimic.multiplier, follow.mimic.offset) == (2.0, 0.01)
 
 
-def test_arrays_are_rows_too() -> None:
+def test_lists_arrays_and_short_names_of_units_are_understood() -> None:
     rows = np.array([[0.4, 0.0, 0.1, 0.0], [0.3, np.pi / 2, 0.0, 0.0]])
     for written in (rows, list(rows), [[np.float32(0.5), np.int64(0), 0, 0]]):
         table = table_from_rows(written, "standard")
         assert table.rows[0].a == float(np.asarray(written)[0, 0])
-
-
-def test_short_names_of_units_are_understood() -> None:
     table = table_from_rows([[400, 90, 0, 45]], "standard", angles="deg", lengths="mm")
     assert table.rows[0].cells == (0.4, math.pi / 2, 0.0, math.pi / 4, 0.0)
 

@@ -1,26 +1,31 @@
 """Whatever a shell, a disc or a terminal does to a command: a result, or a clear line and the right code."""
 
-from __future__ import annotations
-
+import json
 import os
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import click
 import pytest
 
 import urdfkin
 from tests.cli import running
-from urdfkin.errors import SourceError
+from tests.report.documents import arms, failing
+from tests.urdfs import joint, robot
+from urdfkin.cli import exit
+from urdfkin.errors import InputError, SourceError
+from urdfkin.report import html, junit
 from urdfkin.system import files
 from urdfkin.system.files import read_bytes, read_start
+from urdfkin.validation import campaign
+from urdfkin.verify.tables import TableError
 
-ARM = (
-    '<robot name="Ärmchen"><link name="a"/><link name="Hand Größe 3 手"/>'
-    '<joint name="Gelenk_θ" type="continuous"><parent link="a"/><child link="Hand Größe 3 手"/>'
-    '<axis xyz="0 0 1"/></joint></robot>'
-)
+pytestmark = pytest.mark.slow
+ARM = robot(joint("Gelenk_θ", "continuous", "a", "Hand Größe 3 手"), name="Ärmchen")
 
 
 @pytest.fixture
@@ -56,7 +61,6 @@ def one_line(text: str) -> str:
 # -- standard streams --------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("words", ["robots", "--help", "--version", "explain URDF101", "info ur5"])
 def test_a_full_standard_output_is_told_in_a_line(words: str) -> None:
     code, _, err = shell(f"$URDFKIN {words} > /dev/full")
@@ -64,7 +68,6 @@ def test_a_full_standard_output_is_told_in_a_line(words: str) -> None:
     assert "standard output: cannot be written: found No space left on device" in one_line(err)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("words", ["robots", "--help", "info ur5"])
 def test_a_closed_standard_output_is_told_in_a_line(words: str) -> None:
     code, _, err = shell(f"$URDFKIN {words} >&-")
@@ -72,27 +75,22 @@ def test_a_closed_standard_output_is_told_in_a_line(words: str) -> None:
     assert "standard output: cannot be written: found Bad file descriptor" in one_line(err)
 
 
-@pytest.mark.slow
-def test_a_closed_standard_output_is_no_matter_where_a_file_is_written(tmp_path: Path) -> None:
+def test_a_closed_standard_output_is_no_matter_where_a_file_is_written_and_a_closed_input_is_told(
+    tmp_path: Path,
+) -> None:
     code, _, err = shell("$URDFKIN placement ur5 -o T.csv >&-", tmp_path)
     assert code == 0, err
     assert (tmp_path / "T.csv").read_text().startswith("sample,T00")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("closed", ["2>&-", "2>/dev/full", "2>&- >&-"])
-def test_a_standard_error_that_takes_nothing_changes_no_exit_code(closed: str) -> None:
-    assert shell(f"$URDFKIN info nothing_of_this_name {closed}")[0] == 2
-
-
-@pytest.mark.slow
-def test_a_closed_standard_input_is_told_in_a_line() -> None:
     code, out, err = shell("$URDFKIN info - <&-")
     assert (code, out) == (2, "")
     assert "standard input: cannot be read: found Bad file descriptor" in one_line(err)
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("closed", ["2>&-", "2>/dev/full", "2>&- >&-"])
+def test_a_standard_error_that_takes_nothing_changes_no_exit_code(closed: str) -> None:
+    assert shell(f"$URDFKIN info nothing_of_this_name {closed}")[0] == 2
+
+
 @pytest.mark.parametrize("words", ["robots", "--help", "explain 7.130"])
 def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(words: str) -> None:
     code, _, err = shell(f"set -o pipefail; (sleep 0.01; $URDFKIN {words}) | true")
@@ -105,8 +103,7 @@ def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(word
 @pytest.mark.parametrize("columns", ["", "abc", "0", "-5", "1_0", "1e3", "9999", "7", "1"])
 def test_any_columns_give_a_table(columns: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", columns)
-    done = running.urdfkin("info", "ur5")
-    assert done.code == 0, done.err
+    done = running.good("info ur5")
     assert "shoulder_pan_joint" in "".join(done.text.split())
 
 
@@ -119,7 +116,6 @@ ASCII = (
 )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "env"),
     [
@@ -134,7 +130,6 @@ def test_names_of_any_script_are_printed_on_any_terminal(words: str, env: dict[s
     assert out or "github" in words  # which has nothing to say of a good file
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("form", ["terminal", "latex", "toml", "csv", "urdf", "c"])
 def test_a_table_of_names_of_any_script_is_the_same_file_on_an_ascii_terminal(
     form: str, arm: Path, monkeypatch: pytest.MonkeyPatch
@@ -148,16 +143,10 @@ def test_a_table_of_names_of_any_script_is_the_same_file_on_an_ascii_terminal(
         ).out
 
 
-@pytest.mark.slow
-def test_numba_told_not_to_compile_is_no_matter_where_kernels_are_kept() -> None:
+def test_numba_told_not_to_compile_is_no_matter_whether_kernels_are_kept_or_not(tmp_path: Path) -> None:
     code, out, err = shell("$URDFKIN placement ur5", NUMBA_DISABLE_JIT="1")
     assert code == 0, err
     assert "verified by Pinocchio" in out
-
-
-@pytest.mark.slow
-def test_numba_told_not_to_compile_is_no_matter_where_none_is(tmp_path: Path) -> None:
-    """The kernel that takes the least time to compile, and is made of parts as all are."""
     compiling = "from urdfkin.compiled.machine.single import one_configuration as made; print(made.compiled)"
     done = subprocess.run(
         [sys.executable, "-c", compiling],
@@ -178,7 +167,6 @@ WITH_FILES = (
 )  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("long", LONG)
 @pytest.mark.parametrize("words", WITH_FILES)
 def test_a_name_too_long_for_a_file_is_told_in_a_line(
@@ -204,8 +192,7 @@ def test_an_odd_name_is_told_in_a_line(name: str) -> None:
 # -- pipes -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_a_named_pipe_that_nobody_writes_to_is_given_up(
+def test_a_pipe_that_nobody_writes_to_is_given_up_and_reading_ends_where_it_is_told_to(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(files, "PATIENCE", 0.1)
@@ -216,9 +203,12 @@ def test_a_named_pipe_that_nobody_writes_to_is_given_up(
     for take in (urdfkin.load, urdfkin.check):
         with pytest.raises(SourceError, match=r"a pipe without a writer: found nothing in 0.1 s"):
             take(tmp_path / "pipe.urdf")
+    (tmp_path / "file").write_bytes(bytes(5000))
+    assert len(read_start(tmp_path / "file", 1000)) == 1000
+    assert len(read_start(Path("/dev/zero"), 3_000_000, pipes=True)) == 3_000_000
+    assert len(read_bytes(tmp_path / "file", 5000)) == 5000
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("pause", [0.0, 0.3])
 def test_a_named_pipe_is_read_as_soon_as_somebody_writes_however_slowly(pause: float, tmp_path: Path) -> None:
     path = tmp_path / "pipe"
@@ -241,14 +231,6 @@ def test_a_named_pipe_is_read_as_soon_as_somebody_writes_however_slowly(pause: f
         writer.join()
 
 
-def test_reading_ends_where_it_is_told_to(tmp_path: Path) -> None:
-    (tmp_path / "file").write_bytes(bytes(5000))
-    assert len(read_start(tmp_path / "file", 1000)) == 1000
-    assert len(read_start(Path("/dev/zero"), 3_000_000, pipes=True)) == 3_000_000
-    assert len(read_bytes(tmp_path / "file", 5000)) == 5000
-
-
-@pytest.mark.slow
 def test_a_process_substitution_is_a_file(arm: Path) -> None:
     code, out, err = shell("$URDFKIN check <(sleep 0.3; cat arm.urdf) && echo good", arm.parent)
     assert code == 0, err
@@ -257,3 +239,98 @@ def test_a_process_substitution_is_a_file(arm: Path) -> None:
     assert code == 1
     assert "URDF101" in out
     assert shell("cat arm.urdf | $URDFKIN check /dev/stdin", arm.parent)[0] == 0
+
+
+# -- exit codes ------------------------------------------------------------------------------------
+
+
+def _raising(error: BaseException) -> Callable[..., Any]:
+    def call(*_: object, **__: object) -> None:
+        raise error
+
+    return call
+
+
+def _run(error: BaseException) -> int:
+    return exit.run(click.Command("test", callback=_raising(error)), "test")
+
+
+@pytest.mark.parametrize("error", [RuntimeError("odd"), MemoryError(), OSError(5, "odd"), RecursionError()])
+def test_a_crash_has_a_code_of_its_own_and_says_what_to_do(
+    error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(campaign, "validate", _raising(error))
+    done = running.urdfkin("validate ur5")
+    assert done.code == 70
+    assert "Traceback (most recent call last)" in done.err
+    last = done.err.splitlines()[-1]
+    assert last.startswith("urdfkin: this is a defect of urdfkin")
+    assert type(error).__name__ in last
+    assert "Please report it" in last
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (InputError("no"), 2),
+        (TableError("they disagree"), 1),
+        (click.UsageError("no"), 2),
+        (KeyboardInterrupt(), 130),
+        (EOFError(), 130),
+        (click.exceptions.Exit(3), 3),
+    ],
+)
+def test_what_is_raised_on_purpose_has_its_code(
+    error: BaseException, code: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", ["test"])
+    assert _run(error) == code
+
+
+def test_nobody_who_reads_the_output_is_no_success() -> None:
+    done = running.process("robots", stdin=b"")
+    assert done.code == 0
+    command = f"{sys.executable} -m urdfkin report --schema; echo $? >&2"
+    ended = subprocess.run(
+        ["bash", "-c", f"( {command} ) | head -c 1 >/dev/null"], capture_output=True, text=True, check=False
+    )
+    assert "Traceback" not in ended.stderr
+    assert ended.stderr.split()[-1] in ("0", "141")
+
+
+@pytest.mark.parametrize("broken", ["write", "render"])
+def test_when_one_form_fails_the_others_are_written_and_the_report_is_printed(
+    broken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if broken == "render":
+        monkeypatch.setattr(html, "as_files", _raising(RuntimeError("odd")))
+    else:
+        right = Path.replace
+        monkeypatch.setattr(
+            Path, "replace", lambda self, to: right(self, to) if to.suffix != ".html" else _full(self)
+        )
+    forms = ("--html", "r.html", "--json", "r.json", "--junit", "r.xml", "--markdown", "r.md")
+    done = running.urdfkin("validate planar_two_link --samples 2", *forms)
+    assert done.code == {"write": 2, "render": 70}[broken]
+    assert ("r.html: cannot be written" if broken == "write" else "RuntimeError: odd") in done.err
+    assert {path.name for path in tmp_path.iterdir()} == {"r.json", "r.xml", "r.md"}
+    assert json.loads((tmp_path / "r.json").read_text())["verdict"] == "verified"
+    assert "1 robot, " in done.text
+
+
+def _full(_: Path) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_a_disagreement_stays_exit_1_when_its_report_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(junit, "as_junit", _raising(RuntimeError("odd")))
+    path = tmp_path / "r.json"
+    path.write_text(json.dumps(failing()))
+    done = running.urdfkin("report", str(path), "--junit", str(tmp_path / "r.xml"))
+    assert done.code == 1
+    assert "RuntimeError: odd" in done.err
+    path.write_text(json.dumps(arms()))
+    assert running.urdfkin("report", str(path), "--junit", str(tmp_path / "r.xml")).code == 70

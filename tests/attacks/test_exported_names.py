@@ -1,7 +1,5 @@
 """Nothing that a URDF calls a link, a joint or itself becomes code in any language that is exported."""
 
-from __future__ import annotations
-
 import ast
 import re
 import shutil
@@ -20,46 +18,14 @@ from urdfkin.export import LANGUAGES, write
 from urdfkin.export.naming import all_safe, safe, shown, title
 from urdfkin.robot import Robot
 
+pytestmark = pytest.mark.slow
 _PYTHON = [to for to, (_, ending, _) in LANGUAGES.items() if ending.endswith(".py")]
-#: What would be a keyword, a function or a name of ours in one of the languages.
 _WORDS = (
-    *("int", "double", "for", "end", "function", "template", "class", "lambda", "def", "out", "in", "L"),
-    *(
-        "q",
-        "v",
-        "a",
-        "sin",
-        "cos",
-        "sqrt",
-        "R",
-        "T",
-        "real",
-        "np",
-        "main",
-        "eye",
-        "pi",
-        "i",
-        "None",
-        "_",
-        "__",
-    ),
-    *(
-        "t1",
-        "R1_00",
-        "1",
-        "2dof",
-        "\u00e9",
-        "\u202e",
-        "a" * 300,
-        "x" * 41,
-        "*/",
-        "??/",
-        "%{",
-        "%}",
-        "...",
-        "\\",
-    ),
-)
+    "int", "double", "for", "end", "function", "template", "class", "lambda", "def", "out", "in", "L",
+    "q", "v", "a", "sin", "cos", "sqrt", "R", "T", "real", "np", "main", "eye", "pi", "i", "None", "_",
+    "__", "t1", "R1_00", "1", "2dof", "é",
+    "\u202e", "*/", "??/", "%{", "%}", "...", "\\", "a" * 300, "x" * 41,
+)  # fmt: skip
 
 
 def loaded(text: str) -> Robot:
@@ -81,7 +47,6 @@ def robot(request: pytest.FixtureRequest) -> Robot:
     return loaded(ROBOTS[request.param])
 
 
-@pytest.mark.slow
 def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> None:
     written = code(robot, quantities=("placement",))
     words = set(re.findall(r"\w+", written.name)) | {x for row in written.words.values() for x in row}
@@ -102,7 +67,6 @@ def code_alone(text: str, to: str) -> str:
     return re.sub(r'""".*?"""|#[^\n]*', "", text, flags=re.DOTALL)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("to", _PYTHON)
 def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) -> None:
     module = ast.parse(write(code(robot, quantities=("placement",)), to))
@@ -123,7 +87,6 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
     ]
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
 def test_cudas_header_declares_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None:
     written = code(robot, quantities=("placement",))
@@ -140,7 +103,6 @@ def test_cudas_header_declares_no_more_than_its_functions(robot: Robot, tmp_path
     assert plain == {f"{written.name}_placement_{real}" for real in ("double", "float")}
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
 def test_c_says_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None:
     written = code(robot, quantities=("placement",))
@@ -156,7 +118,6 @@ def test_c_says_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None
     }
 
 
-@pytest.mark.slow
 @given(st.lists(st.one_of(st.text(max_size=60), st.sampled_from([*_WORDS, *NAMES.values()])), max_size=20))
 def test_identifiers_are_words_no_two_alike(names: list[str]) -> None:
     found = all_safe(names)
@@ -166,7 +127,6 @@ def test_identifiers_are_words_no_two_alike(names: list[str]) -> None:
         assert not word.startswith("_")
 
 
-@pytest.mark.slow
 @given(st.text(max_size=60) | st.sampled_from([*_WORDS, *NAMES.values()]))
 def test_words_of_a_comment_end_none(name: str) -> None:
     for text in (shown(name), shown(name * 50)):

@@ -1,6 +1,8 @@
 """From the smallest numbers to the largest: no false alarm, no result refused that exists, no slip hidden."""
 
 import math
+import shlex
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -8,31 +10,33 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
-from urdfkin.errors import RangeError
+from tests.cli.running import urdfkin as command
+from tests.urdfs import joint, limit, mimic
+from tests.urdfs import robot as robot_of
+from urdfkin.compiled import breakdown
+from urdfkin.compiled.breakdown import AccelerationBreakdown
+from urdfkin.compiled.plan import LANES
+from urdfkin.compiled.python_numbers import LARGE
+from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
+from urdfkin.validation.accuracy import judge
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.quantities import VELOCITY
 
 #: A planar, a floating and a sliding joint between turning ones, and two followers.
-ODD = """<robot name="odd">
-<link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/><link name="l4"/>
-<link name="l5"/><link name="l6"/>
-<joint name="a" type="planar"><parent link="l0"/><child link="l1"/>
-  <origin xyz="0.1 0.2 0.3" rpy="0.3 0.4 0.5"/><axis xyz="0 0 1"/></joint>
-<joint name="b" type="continuous"><parent link="l1"/><child link="l2"/>
-  <origin xyz="0.3 -0.2 0.1" rpy="0.1 0.2 0.3"/><axis xyz="1 2 3"/></joint>
-<joint name="c" type="prismatic"><parent link="l2"/><child link="l3"/><origin xyz="0 0 1e-310" rpy="1 2 3"/>
-  <axis xyz="0 1 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="d" type="floating"><parent link="l3"/><child link="l4"/><origin rpy="1 0 0"/></joint>
-<joint name="e" type="continuous"><parent link="l4"/><child link="l5"/><origin xyz="0.3 0 0"/>
-  <axis xyz="0 0 1"/><mimic joint="b" multiplier="-1e-5" offset="0.2"/></joint>
-<joint name="f" type="prismatic"><parent link="l5"/><child link="l6"/><origin xyz="0 0.2 0" rpy="0 1 0"/>
-  <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
-  <mimic joint="c" multiplier="3"/></joint></robot>"""
+ODD = robot_of(
+    joint("a", "planar", "l0", "l1", 'xyz="0.1 0.2 0.3" rpy="0.3 0.4 0.5"'),
+    joint("b", "continuous", "l1", "l2", 'xyz="0.3 -0.2 0.1" rpy="0.1 0.2 0.3"', "1 2 3"),
+    joint("c", "prismatic", "l2", "l3", 'xyz="0 0 1e-310" rpy="1 2 3"', "0 1 1", limit()),
+    joint("d", "floating", "l3", "l4", 'rpy="1 0 0"', ""),
+    joint("e", "continuous", "l4", "l5", 'xyz="0.3 0 0"', more=mimic("b", -1e-5, 0.2)),
+    joint("f", "prismatic", "l5", "l6", 'xyz="0 0.2 0" rpy="0 1 0"', more=limit() + mimic("c", 3)),
+    name="odd",
+)
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 #: Coordinates of the robot above that are lengths.
 LENGTHS = [0, 1, 4, 5, 6, 7]
@@ -49,18 +53,13 @@ def numbers(rng: np.random.Generator, exponent: int, size: int) -> FloatArray:
 def everything(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None) -> int:
     """Every quantity of the last link in every reference; how many leave the range of doubles."""
     beyond = 0
+    methods = [(robot.placement, q), *((x, q) for x in (robot.jacobian, robot.hessian))]
+    methods += [(x, q, v) for x in (robot.velocity, robot.jacobian_rate)]
+    methods += [(x, q, v, a) for x in (robot.acceleration, robot.acceleration_breakdown)]
     for reference in REFERENCES:
-        for compute in (
-            lambda reference: robot.placement(q, "l6", base=base),
-            lambda reference: robot.velocity(q, v, "l6", reference, base=base),
-            lambda reference: robot.jacobian(q, "l6", reference, base=base),
-            lambda reference: robot.jacobian_rate(q, v, "l6", reference, base=base),
-            lambda reference: robot.hessian(q, "l6", reference, base=base),
-            lambda reference: robot.acceleration(q, v, a, "l6", reference, base=base),
-            lambda reference: robot.acceleration_breakdown(q, v, a, "l6", reference, base=base),
-        ):
+        for method, *inputs in methods:
             try:
-                compute(reference)
+                method(*inputs, "l6", *([reference] if method != robot.placement else []), base=base)
             except RangeError:
                 beyond += 1
     return beyond
@@ -104,8 +103,7 @@ def test_small_rates_beside_coordinates_of_ordinary_size_are_verified(
     assert everything(robot, q, numbers(rng, rate, robot.nv), numbers(rng, rate, robot.nv), None) == 0
 
 
-PLANAR = """<robot name="t"><link name="a"/><link name="b"/><joint name="f" type="planar"><parent link="a"/>
-<child link="b"/><origin rpy="0.3 0.4 0.5"/><axis xyz="0 0 1"/></joint></robot>"""
+PLANAR = robot_of(joint("f", "planar", "a", "b", 'rpy="0.3 0.4 0.5"'))
 
 
 @pytest.mark.parametrize("size", [1e-323, 1e-310, 1e-200, 1e-170, 1e-154])
@@ -134,13 +132,10 @@ def test_a_place_whose_square_overflows_is_verified(size: float) -> None:
     assert robot.certificate().verified
 
 
-def test_a_product_counts_as_the_smallest_normal_number_unless_a_factor_is_zero() -> None:
+def test_a_scale_of_zero_means_equal_and_a_product_of_others_is_at_least_the_smallest_number() -> None:
     x = np.array([0.0, 1e-200, 1e-200, 5e-324, 1.0, 0.0])
     y = np.array([1e-200, 1e-200, 1e-50, 5e-324, 2.0, 0.0])
     assert product(x, y).tolist() == [0.0, SMALLEST, 1e-200 * 1e-50, SMALLEST, 2.0, 0.0]
-
-
-def test_a_scale_of_zero_still_means_equal() -> None:
     robot = urdfkin.load("panda")
     q = robot.neutral()
     robot.velocity(q, np.zeros(robot.nv), "panda_hand")
@@ -148,3 +143,251 @@ def test_a_scale_of_zero_still_means_equal() -> None:
     assert not size.vel.any()
     assert not size.w.any()
     assert "velocity" in [line.quantity for line in robot.certificate().lines]
+
+
+# -- found by random whole robots (scripts/fuzz.py) ------------------------------------------------
+
+
+def two_axes(first: float, second: float) -> str:
+    """Two skew axes, at so many metres from the base and from one another."""
+    return robot_of(
+        joint("x", "continuous", "a", "b", f'xyz="{first!r} 0 0.1" rpy="1 0.2 0.3"'),
+        joint("y", "continuous", "b", "c", f'xyz="{second!r} 0.1 0.2" rpy="1 0.2 0.3"', "0 0.6 0.8"),
+    )
+
+
+@pytest.mark.parametrize(("first", "second"), [(1e155, 0.3), (0.3, -1e200), (1e300, 1e300)])
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_a_table_of_lengths_whose_squares_overflow_is_refused_and_no_error_of_ours(
+    first: float, second: float, convention: str
+) -> None:
+    robot = urdfkin.load(two_axes(first, second))
+    with pytest.raises(RangeError, match=r"joint [xy]: .*square of this length"):
+        robot.dh("c", "a", convention)
+    if first == 1e155:  # the path is short, but Pinocchio comes from the root
+        with pytest.raises(RangeError, match="joint x"):
+            robot.dh("c", "b", convention)
+    assert robot.placement(robot.neutral(), "c").shape == (4, 4)
+
+
+def test_tables_and_tree_parameters_of_lengths_up_to_there_are_verified_and_beyond_refused() -> None:
+    with pytest.raises(RangeError, match="square of this length"):
+        urdfkin.load(two_axes(1e160, 0.3)).tree_parameters()
+    robot = urdfkin.load(two_axes(1e148, 1e147))
+    for convention in ("standard", "modified"):
+        robot.dh("c", "a", convention)
+        robot.dh("c", "b", convention)
+    robot.tree_parameters()
+
+
+TINY = robot_of(joint("x", "continuous", "a", "b", 'xyz="1e-195 1e-196 1e-195" rpy="1 0.2 0.3"', "0 0.6 0.8"))
+
+
+@pytest.mark.filterwarnings("error::urdfkin.NotVerifiedWarning")
+def test_lengths_whose_squares_vanish_do_not_lose_to_rounding_and_the_judges_units_do_not_vanish() -> None:
+    robot = urdfkin.load(TINY)
+    for convention in ("standard", "modified"):
+        robot.dh("b", "a", convention)
+    assert urdfkin.validate([TINY.encode()], samples=2).passed
+    for line in judge(urdfkin.load(FAINT), samples=2).lines:
+        assert line.urdfkin.worst < 100.0, line
+        assert line.pinocchio.worst < 100.0, line
+
+
+FAINT = robot_of(
+    joint("x", "continuous", "a", "b"),
+    joint("y", "continuous", "a", "c", axis="0 1 0", more=mimic("x", "5e-324")),
+)
+
+
+# -- results that leave the range of doubles -------------------------------------------------------
+
+
+FRAME = "tool0"
+#: Rates or accelerations of this size give w^2 d, or w x vel, beyond all numbers.
+HUGE = 1e200
+METHODS: dict[str, Callable[..., object]] = {
+    "acceleration": lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, **o),
+    "acceleration, local": lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, "local", **o),
+    "acceleration, world": lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, "world", **o),
+    "accelerations": lambda r, q, v, a, **o: r.acceleration(q, v, a, [FRAME, "base_link"], **o),
+    "acceleration_breakdown": lambda r, q, v, a, **o: r.acceleration_breakdown(q, v, a, FRAME, **o),
+}
+
+
+@pytest.fixture(scope="module")
+def ur5() -> Robot:
+    return urdfkin.load("ur5")
+
+
+@pytest.mark.parametrize("verify", [True, False, "sample"])
+@pytest.mark.parametrize("method", METHODS)
+def test_of_a_single_configuration_and_of_a_batch(ur5: Robot, method: str, verify: bool | str) -> None:
+    q, v = ur5.sample(3 * LANES + 1, 1), np.ones((3 * LANES + 1, 6))
+    for row in (0, LANES, 3 * LANES):
+        wild = v.copy()
+        wild[row] = HUGE
+        with pytest.raises(RangeError):
+            METHODS[method](ur5, q, wild, v, verify=verify)
+        with pytest.raises(RangeError):
+            METHODS[method](ur5, q[row], wild[row], v[row], verify=verify)
+    METHODS[method](ur5, q, v, v, verify=verify)
+
+
+@pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
+def test_of_a_prepared_frame_which_then_counts_nothing(reference: str) -> None:
+    robot = urdfkin.load("ur5")
+    fast, q, v = robot.prepare(FRAME, reference), robot.sample(1)[0], np.ones(6)
+    before = fast.acceleration(q, v, v)
+    for wild in (np.full(6, HUGE), np.full(6, -HUGE), np.full(6, 1e308)):
+        with pytest.raises(RangeError):
+            fast.acceleration(q, wild, v)
+    with pytest.raises(NotFiniteError):
+        fast.acceleration(q, np.full(6, np.nan), v)
+    np.testing.assert_array_equal(fast.acceleration(q, v, v), before)
+    assert [line.unchecked for line in robot.certificate().lines] == [2]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, None])
+@pytest.mark.parametrize("row", [0, 2500, 4999])
+def test_in_the_part_of_any_thread(ur5: Robot, threads: int | None, row: int) -> None:
+    q, v = ur5.sample(5000, 1), np.ones((5000, 6))
+    v[row] = HUGE
+    with pytest.raises(RangeError, match=f"sample {row} of 5000"):
+        ur5.acceleration(q, v, v, FRAME, threads=threads, verify=False)
+    with pytest.raises(RangeError):
+        ur5.jacobian_rate(q, v * 1e108, FRAME, "local", threads=threads, verify=False)
+
+
+def test_on_a_base_that_moves_too_fast(ur5: Robot) -> None:
+    q, v = ur5.sample(4), np.ones((4, 6))
+    one, several = np.full(6, HUGE), np.ones((4, 6))
+    several[2] = HUGE
+    for rates in (one, several):
+        with pytest.raises(RangeError):
+            ur5.acceleration(q, v, v, FRAME, base=BaseMotion(velocity=rates), verify=False)
+
+
+def test_of_a_robot_that_is_itself_of_that_size() -> None:
+    far = joint("k", "fixed", "b", "c", 'xyz="1e250 0 0"', "")
+    robot = urdfkin.load(robot_of(joint("j", "continuous", "a", "b"), far))
+    fast = robot.prepare("c")
+    for rate in (1e30, 1e44):  # of an ordinary robot nobody would look
+        with pytest.raises(RangeError):
+            fast.acceleration(np.zeros(1), np.array([rate]), np.zeros(1))
+        with pytest.raises(RangeError):
+            robot.acceleration([0.0], [rate], [0.0], "c", verify=False)
+    assert fast.acceleration(np.zeros(1), np.array([2.0]), np.zeros(1))[0] == -4e250
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_results_that_exist_are_handed_out_however_large(ur5: Robot, method: str) -> None:
+    # A power of two scales every product exactly: the bits are those of the same motion, slower.
+    factor = 2.0**450
+    assert factor > LARGE
+    q, v = ur5.sample(5, 2), np.random.default_rng(3).normal(size=(5, 6))
+    slow, fast = (METHODS[method](ur5, q, v * f, v * f * f, verify=False) for f in (1.0, factor))
+    if isinstance(slow, np.ndarray):
+        np.testing.assert_array_equal(slow * factor * factor, fast)
+        single = ur5.prepare(FRAME).acceleration(q[0], v[0] * factor, v[0] * factor * factor)
+        if method == "acceleration" and isinstance(fast, np.ndarray):
+            np.testing.assert_array_equal(single, fast[0])
+    METHODS[method](ur5, q, v * factor, v * factor * factor)
+
+
+def test_the_limit_is_where_nothing_can_overflow_below_it() -> None:
+    # N joints of the largest numbers that are not looked at: the bound on w^2 d in the limit's comment.
+    joints = 10_000
+    assert np.isfinite(4.0 * joints**3 * LARGE**6)
+
+
+# -- an acceleration's parts far from the origin ---------------------------------------------------
+
+
+def base_at(distance: float, rates: FloatArray) -> BaseMotion:
+    T = np.eye(4)
+    T[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    T[:3, 3] = distance * np.array([0.5, 4.5, 1e-4])
+    return BaseMotion(T, rates[:6], rates[6:])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reference", REFERENCES)
+@pytest.mark.parametrize("distance", [0.0, 1e4, 1e5, 1e6, 1e8, 1e12])
+def test_on_a_base_at_map_coordinates_it_is_verified_with_as_small_a_share(
+    distance: float, reference: str
+) -> None:
+    robot = urdfkin.load("panda")
+    rng = np.random.default_rng(1)
+    q, (v, a) = robot.sample(60, 1), rng.normal(size=(2, 60, robot.nv))
+    robot.acceleration_breakdown(
+        q, v, a, "panda_hand", reference, base=base_at(distance, rng.normal(size=12))
+    )
+    (line,) = robot.certificate().lines
+    assert line.quantity == "acceleration breakdown"
+    assert line.checked == 60
+    assert line.share < 0.05
+
+
+@pytest.mark.parametrize("root_joint", ["floating", "planar"])
+def test_behind_a_root_joint_that_stands_far_away_it_is_verified(root_joint: str) -> None:
+    robot = urdfkin.load("panda", root_joint=root_joint)
+    rng = np.random.default_rng(2)
+    q, (v, a) = robot.sample(60, 1), rng.normal(size=(2, 60, robot.nv))
+    q[:, :2] += [5e5, 4.5e6]
+    for reference in REFERENCES:
+        robot.acceleration_breakdown(q, v, a, "panda_hand", reference)
+    assert robot.certificate().lines[0].share < 0.05
+
+
+@pytest.mark.parametrize("reference", ["local", "local_world_aligned"])
+def test_each_part_is_the_one_it_is_at_the_origin(reference: str) -> None:
+    robot = urdfkin.load("panda")
+    rng = np.random.default_rng(3)
+    q, (v, a), rates = robot.sample(20, 1), rng.normal(size=(2, 20, robot.nv)), rng.normal(size=12)
+    here, there = (
+        robot.acceleration_breakdown(q, v, a, "panda_hand", reference, base=base_at(distance, rates))
+        for distance in (0.0, 1e7)
+    )
+    scale = np.abs(here.terms).max()
+    assert np.abs(here.terms - there.terms).max() < 20 * EPS * scale
+    assert np.abs(here.base - there.base).max() < 20 * EPS * np.abs(here.base).max()
+
+
+def spoiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Transverse parts that are off by a relative 1e-9."""
+    right = breakdown._terms
+
+    def wrong(*x: FloatArray) -> FloatArray:
+        terms = right(*x)  # type: ignore[arg-type]
+        terms[:, 0] *= 1.0 + 1e-9
+        return terms
+
+    monkeypatch.setattr(breakdown, "_terms", wrong)
+
+
+def disagreement(robot: Robot, base: BaseMotion | None) -> urdfkin.VerificationError:
+    rng = np.random.default_rng(4)
+    q, (v, a) = robot.sample(3, 1), rng.normal(size=(2, 3, robot.nv))
+    with pytest.raises(urdfkin.VerificationError, match="acceleration breakdown") as caught:
+        robot.acceleration_breakdown(q, v, a, "panda_hand", "local", base=base)
+    return caught.value
+
+
+def test_the_replay_line_computes_the_parts_on_a_moving_base_and_explains_them_elsewhere(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    spoiled(monkeypatch)
+    base = base_at(1e5, np.arange(12.0))
+    line = disagreement(urdfkin.load("panda"), base).reproduce
+    assert ".acceleration_breakdown(" in line
+    with pytest.raises(urdfkin.VerificationError):
+        eval(line)
+    monkeypatch.undo()
+    assert isinstance(eval(line), AccelerationBreakdown)
+    spoiled(monkeypatch)
+    words = shlex.split(disagreement(urdfkin.load("panda"), None).reproduce)
+    assert words[:3] == ["urdfkin", "acceleration", "--breakdown"]
+    assert command(*words[1:]).code == 1
+    monkeypatch.undo()
+    assert command(*words[1:]).code == 0

@@ -3,13 +3,13 @@
 Each case is a process of its own: Python warns of forks beside threads, and a child that hangs must be ended.
 """
 
-from __future__ import annotations
-
-import subprocess
-import sys
 import textwrap
+from pathlib import Path
 
 import pytest
+
+import urdfkin
+from tests.cli.running import python
 
 #: Fork, let the child do `child()`, and say how it ended; one that hangs is ended after a while.
 HARNESS = """
@@ -38,6 +38,13 @@ def fork(child, patience=60.0):
     os.waitpid(pid, 0)
     print("hung")
 
+def beside(*works):
+    '''Threads that do these works.'''
+    threads = [threading.Thread(target=work) for work in works]
+    for thread in threads:
+        thread.start()
+    return lambda: [thread.join() for thread in threads]
+
 def held(lock, seconds=1.0):
     '''Another thread has the lock for a while.'''
     has = threading.Event()
@@ -45,7 +52,7 @@ def held(lock, seconds=1.0):
         with lock:
             has.set()
             time.sleep(seconds)
-    threading.Thread(target=hold).start()
+    beside(hold)
     has.wait()
 """
 
@@ -64,13 +71,12 @@ CASES = {
         def work():
             while not stop.is_set():
                 robot.jacobian(q, "tool0", threads=2)
-        thread = threading.Thread(target=work)
-        thread.start()
+        join = beside(work)
         for _ in range(5):
             time.sleep(0.05)
             fork(lambda: robot.jacobian(q, "tool0", threads=2))
         stop.set()
-        thread.join()
+        join()
         """,
     "an entry in the ledger, while another thread makes one": """
         from urdfkin.verify import certificate
@@ -100,11 +106,10 @@ CASES = {
             robot.dh("tool0")
             robot.screws("tool0")
             robot.convention("mujoco")
-        thread = threading.Thread(target=ask)
-        thread.start()
+        join = beside(ask)
         time.sleep(0.01)
         fork(ask)
-        thread.join()
+        join()
         """,
     "a robot, while another thread needs the lock of logging during an import": """
         import logging
@@ -115,11 +120,10 @@ CASES = {
                 has.set()
                 time.sleep(1.0)
                 logging.getLogger("of a module that is imported")
-        thread = threading.Thread(target=work)
-        thread.start()
+        join = beside(work)
         has.wait()
         fork(lambda: robot.placement(q[:3], "tool0"))
-        thread.join()
+        join()
         """,
     "several threads that fork at the same time": """
         import urdfkin.compiled.kept
@@ -131,9 +135,7 @@ CASES = {
                 if pid == 0:
                     os._exit(0)
                 codes.add(os.waitpid(pid, 0)[1])
-        threads = [threading.Thread(target=many) for _ in range(3)]
-        [thread.start() for thread in threads]
-        [thread.join() for thread in threads]
+        beside(many, many, many)()
         assert codes == {0}
         sys.setswitchinterval(5e-3)
         fork(lambda: robot.placement(q[:3], "tool0"))
@@ -177,19 +179,12 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_a_forked_child_computes(case: str) -> None:
     code = HARNESS + textwrap.dedent(CASES[case])
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=250
-    )
-    assert done.returncode == 0, done.stderr
+    done = python(code, timeout=250)
     assert set(done.stdout.splitlines()) == {"ended with 0"}, done.stderr
 
 
 def test_every_lock_and_pool_of_the_package_is_made_for_forks() -> None:
     """A new lock or pool has to say what a fork does to it; those of a validation end with its run."""
-    from pathlib import Path  # noqa: PLC0415
-
-    import urdfkin  # noqa: PLC0415
-
     made = ("threading.Lock(", "threading.RLock(", "default_factory=threading", "ThreadPoolExecutor(")
     package = Path(str(urdfkin.__file__)).parent
     found = {

@@ -91,37 +91,13 @@ def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
     grows_like_its_size(read, 100_000)
 
 
-def test_a_chain_of_followers_is_multiplied_out() -> None:
-    rules = [('<mimic joint="j0" multiplier="2" offset="3"/>', 0), ('<mimic joint="j1" multiplier="5"/>', 1)]
-    joint = (
-        '<joint name="j{i}" type="continuous"><parent link="l{i}"/><child link="l{c}"/>'
-        '<axis xyz="0 0 1"/>{rule}</joint>'
-    )
-    rows = [joint.format(i=i, c=i + 1, rule=rule) for i, rule in enumerate(["", *(r for r, _ in rules)])]
-    links = "".join(f'<link name="l{i}"/>' for i in range(4))
-    text = f'<robot name="r">{links}{"".join(reversed(rows))}</robot>'
-    tree = tree_of(text.encode())
-    again = rules_of_text(text, [joint.name for joint in tree.joints])
-    for mimic in (tree.joints[2].mimic, again[tree.joints[2].name]):
-        assert mimic is not None
-        assert (mimic.leader, mimic.multiplier, mimic.offset) == ("j0", 10.0, 15.0)
-
-
-def test_of_a_text_only_the_beginning_is_kept() -> None:
+def test_of_a_text_the_beginning_is_kept_and_many_blanks_before_it_lose_nothing() -> None:
     root = read_document(Reporter("f", b"<robot>" + b"some &lt; words " * 10_000 + b"</robot>"))
     assert root is not None
     assert root.text.startswith("some < words some")
     assert len(root.text) < 1_000
-
-
-def test_a_text_that_begins_with_many_blanks_is_not_lost() -> None:
     (finding,) = check_text(arm(more=" \n" * 5_000 + "hello").encode())
     assert (finding.code, finding.found) == ("URDF212", '"hello"')
-
-
-def test_a_number_written_by_references_of_thousands_of_digits_is_told_and_does_not_crash() -> None:
-    codes = {size: codes_of(f'xyz="&#{"0" * size}49; 0 0"') for size in (10, 3_000, 10_000)}
-    assert codes == {10: set(), 3_000: set(), 10_000: {"URDF305"}}
 
 
 def codes_of(origin: str) -> set[str]:
@@ -136,6 +112,10 @@ def codes_of(origin: str) -> set[str]:
         (f'xyz="0.{"1" * 1_998} 0 0"', None),
         (f'xyz="0.{"1" * 1_999} 0 0"', "URDF305"),
         (f'xyz="{"1 " * 100_000}"', "URDF305"),
+        *(
+            (f'xyz="&#{"0" * size}49; 0 0"', code)
+            for size, code in ((10, None), (3_000, None), (10_000, "URDF305"))
+        ),
     ],
 )
 def test_a_number_longer_than_any_number_is_refused_as_such(origin: str, code: str | None) -> None:
@@ -152,13 +132,15 @@ def told(findings: list[Finding], code: str) -> int:
 
 
 @pytest.mark.long
-def test_errors_of_one_kind_are_summed_up_and_none_is_lost() -> None:
+def test_errors_of_one_kind_are_summed_up_none_is_lost_and_they_hide_none_of_another_kind() -> None:
     findings = urdfkin.check(DOUBLES, fold=True)
     assert len(findings) == ERRORS_SHOWN
     assert told(findings, "URDF402") == MANY - 1
     last = str(findings[-1])
     assert f"(also on lines 102, 103, 104, 105 and {MANY - 105} more)" in last
     assert sum(len(str(finding)) for finding in findings) < 50_000
+    findings = urdfkin.check(DOUBLES.replace("</robot>", "<joint name='j' type='x'/></robot>"), fold=True)
+    assert {"URDF402", "URDF501", "URDF210"} <= {finding.code for finding in findings}
 
 
 @pytest.mark.long
@@ -182,34 +164,22 @@ def test_the_message_of_a_refused_robot_stays_short_and_counts_everything() -> N
     assert len(message) < 2_000
 
 
-@pytest.mark.long
-def test_errors_of_another_kind_are_not_hidden_by_many_of_one() -> None:
-    findings = urdfkin.check(DOUBLES.replace("</robot>", "<joint name='j' type='x'/></robot>"), fold=True)
-    assert {"URDF402", "URDF501", "URDF210"} <= {finding.code for finding in findings}
-
-
-def test_many_on_one_line_are_counted_too() -> None:
+def test_many_on_one_line_are_counted_and_a_warning_speaks_for_those_on_its_own_line() -> None:
     text = "<robot name='r'>" + "<link name='a'/>" * 150 + "</robot>"
     findings = urdfkin.check(text, fold=True)
     assert told(findings, "URDF402") == 149
     assert "(49 more on this line)" in str(findings[-1])
-
-
-def test_a_warning_speaks_for_those_on_its_own_line() -> None:
     (finding,) = urdfkin.check(arm(more="<a/><b/><c/><d/>\n<e/>"), fold=True)
     assert (finding.count, finding.severity) == (5, Severity.WARNING)
     assert "(4 more on this line and line 9)" in str(finding)
 
 
-def test_an_attribute_among_many_is_found_on_its_line_and_column() -> None:
+def test_who_is_nearest_and_an_attribute_among_many_are_found_in_time() -> None:
     attributes = "".join(f'\n  a{i}="ä" b{i}="1"' for i in range(50))
     findings = urdfkin.check(f'<robot name="r"><link name="l"{attributes}/></robot>')
     assert [(f.line, f.column) for f in findings] == [
         place for i in range(50) for place in ((i + 2, 3), (i + 2, 9 + len(str(i))))
     ]
-
-
-def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
     known = ["ab" * 60 + str(i) for i in range(100_000)]
     with at_most(ENOUGH):
         assert len(nearest("ba" * 60, known)) == 3
@@ -219,12 +189,7 @@ def test_who_is_nearest_is_found_without_comparing_for_ever() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("inside", "filling"),
-    [
-        ("<!--{}-->", "a"),
-        ("<?a {}?>", "a"),
-        ('<material note="{}"/>', "a"),
-        ("<material {}/>", 'a="1" '),
-    ],
+    [("<!--{}-->", "a"), ("<?a {}?>", "a"), ('<material note="{}"/>', "a"), ("<material {}/>", 'a="1" ')],
 )
 def test_markup_that_does_not_end_is_refused_before_it_is_read_again_and_again(
     inside: str, filling: str

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.urdfs import chain
 from urdfkin.validation.accuracy import judge
 from urdfkin.verify.exact.numbers import precision, read_exact
 
@@ -12,12 +13,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 
 def text(origins: list[str], version: str) -> str:
     """A chain whose joints have these origins."""
-    joints = "".join(
-        f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
-        f'<child link="l{i + 1}"/><origin xyz="0.3 0.2 0.1" {origin}/><axis xyz="0 1 0"/></joint>'
-        for i, origin in enumerate(origins)
-    )
-    return f'<robot name="r" {version}><link name="l0"/>{joints}</robot>'
+    inside = [f'<origin xyz="0.3 0.2 0.1" {origin}/>' for origin in origins]
+    return chain(inside, origin="", axis="0 1 0", attributes=version)
 
 
 def quaternions(scale: float) -> list[str]:

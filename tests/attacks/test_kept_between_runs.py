@@ -1,6 +1,4 @@
-"""What is kept between runs: damage is mended, a full disc ends nothing, what a stranger keeps is not run."""
-
-from __future__ import annotations
+"""Files kept between runs: damage is mended, a full disc ends nothing, a stranger's files are not run."""
 
 import errno
 import os
@@ -10,8 +8,9 @@ import signal
 import stat
 import subprocess
 import sys
+import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,9 @@ import numpy as np
 import pytest
 
 from tests.cli.running import Done, process
+from urdfkin import compiled as recursion
+from urdfkin import kinematics
+from urdfkin.compiled import kept, machine
 from urdfkin.compiled.machine import compiling
 from urdfkin.compiled.machine.compiling import NUMBERS, Kernel
 from urdfkin.system import cache
@@ -78,11 +80,16 @@ DAMAGE: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
-def test_a_kernel_is_compiled_once_and_read_afterwards(folder: Path) -> None:
+def test_a_kernel_is_compiled_once_and_read_unless_it_is_of_another_time(folder: Path) -> None:
     assert was_compiled(fresh())
     again = fresh()
     assert not was_compiled(again)
     assert ask(again) == 7
+    (file,) = folder.iterdir()
+    put(file, pickle.dumps(("not", "a", "kernel")))
+    with pytest.warns(CacheWarning, match="is damaged and is computed again"):
+        assert ask(fresh()) == 7
+    assert not was_compiled(fresh())
 
 
 @pytest.mark.long
@@ -97,15 +104,6 @@ def test_a_damaged_kernel_is_said_compiled_again_and_mended(damage: str, folder:
     assert was_compiled(kernel)
     assert not was_compiled(fresh())
     assert list(folder.iterdir()) == [file]
-
-
-def test_a_kernel_that_is_whole_but_of_another_time_is_compiled_again(folder: Path) -> None:
-    ask(fresh())
-    (file,) = folder.iterdir()
-    put(file, pickle.dumps(("not", "a", "kernel")))
-    with pytest.warns(CacheWarning, match="is damaged and is computed again"):
-        assert ask(fresh()) == 7
-    assert not was_compiled(fresh())
 
 
 def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) -> None:
@@ -232,7 +230,15 @@ def refused(root: Path, words: str) -> None:
         assert kept_folder("kernels", [], root=root) is None
 
 
-def test_a_folder_of_ones_own_is_closed_to_others(tmp_path: Path) -> None:
+def made(root: Path, *words: str, kind: str = "kernels") -> Path:
+    folder = kept_folder(kind, [], *words, root=root)
+    assert folder is not None
+    return folder
+
+
+def test_a_folder_of_ones_own_is_closed_to_others_and_may_be_of_a_group_of_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = os.umask(0)
     try:
         folder = kept_folder("kernels", [], root=tmp_path / "urdfkin")
@@ -240,35 +246,33 @@ def test_a_folder_of_ones_own_is_closed_to_others(tmp_path: Path) -> None:
         os.umask(before)
     assert folder is not None
     assert [stat.S_IMODE(place.stat().st_mode) for place in (folder, folder.parent)] == [0o700, 0o700]
+    folder = made(tmp_path)
+    folder.chmod(0o770)
+    monkeypatch.setattr(cache, "_is_private", lambda group: True)
+    assert kept_folder("kernels", [], root=tmp_path) == folder
+    monkeypatch.setattr(cache, "_is_private", lambda group: False)
+    refused(tmp_path, "a group can write to")
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o702])
 def test_a_folder_that_everybody_may_write_in_is_refused(mode: int, tmp_path: Path) -> None:
-    folder = kept_folder("kernels", [], root=tmp_path)
-    assert folder is not None
+    folder = made(tmp_path)
     folder.chmod(mode)
     refused(tmp_path, r"every user can write to .*chmod go-w.* and delete")
 
 
-def test_a_folder_in_which_everybody_could_put_another_in_its_place_is_refused(tmp_path: Path) -> None:
+def test_a_folder_in_which_everybody_could_put_another_or_of_a_root_without_writing_is_refused(
+    tmp_path: Path,
+) -> None:
     shared = tmp_path / "shared"
     shared.mkdir()
     shared.chmod(0o777)
     refused(shared / "urdfkin", "every user can write to")
     shared.chmod(0o1777)  # sticky, as /tmp: nobody can move what another owns
     assert kept_folder("kernels", [], root=shared / "urdfkin") is not None
-
-
-def test_a_folder_of_a_group_is_refused_but_not_that_of_a_users_own_group(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = kept_folder("kernels", [], root=tmp_path)
-    assert folder is not None
-    folder.chmod(0o770)
-    monkeypatch.setattr(cache, "_is_private", lambda group: True)
-    assert kept_folder("kernels", [], root=tmp_path) == folder
-    monkeypatch.setattr(cache, "_is_private", lambda group: False)
-    refused(tmp_path, "a group can write to")
+    (tmp_path / "file").write_text("")
+    with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
+        assert kept_folder("kernels", [], root=tmp_path / "file") is None
 
 
 @pytest.mark.parametrize("whose", ["the folder", "the one above", "the file behind a link"])
@@ -277,8 +281,7 @@ def test_a_folder_of_another_user_is_refused(
 ) -> None:
     """Its files would be unpickled, and could do anything. Only the superuser can give folders away."""
     root = tmp_path / "shared" / "urdfkin"
-    folder = kept_folder("kernels", [], root=root)
-    assert folder is not None
+    folder = made(root)
     stranger = {"the folder": folder, "the one above": root.parent}.get(whose, folder)
     if whose == "the file behind a link":
         (tmp_path / "link").symlink_to(root)
@@ -296,7 +299,7 @@ def test_a_folder_of_another_user_is_refused(
     refused(root, "belongs to another user; set XDG_CACHE_HOME to a folder of your own")
 
 
-def test_a_planted_kernel_of_another_user_is_not_unpickled(
+def test_a_planted_kernel_of_another_user_is_not_unpickled_and_an_old_folder_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if os.geteuid() != 0:
@@ -310,6 +313,11 @@ def test_a_planted_kernel_of_another_user_is_not_unpickled(
     with pytest.warns(CacheWarning, match="belongs to another user"):
         assert ask(fresh()) == 7
     assert not Planted.ran
+    old = made(tmp_path / "others", "old")
+    os.utime(old / ".used", (0.0, 0.0))
+    os.chown(old / ".used", 12345, 12345)
+    made(tmp_path / "others", "new")
+    assert old.exists()
 
 
 class Planted:
@@ -325,21 +333,10 @@ def run_planted() -> None:
     Planted.ran = True
 
 
-def test_the_month_old_folder_of_another_user_is_left_alone(tmp_path: Path) -> None:
-    if os.geteuid() != 0:
-        pytest.skip("only the superuser can give a folder away")
-    old = kept_folder("kernels", [], "old", root=tmp_path)
-    assert old is not None
-    os.utime(old / ".used", (0.0, 0.0))
-    os.chown(old / ".used", 12345, 12345)
-    kept_folder("kernels", [], "new", root=tmp_path)
-    assert old.exists()
-
-
 def test_a_folder_that_can_only_be_read_is_still_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = kept_folder("kernels", [], root=tmp_path)
+    folder = made(tmp_path)
 
     def refuse(*_: object, **__: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
@@ -348,3 +345,72 @@ def test_a_folder_that_can_only_be_read_is_still_read(
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert kept_folder("kernels", [], root=tmp_path) == folder
+
+
+# -- a folder for each state of the sources --------------------------------------------------------
+
+
+@pytest.mark.parametrize("changed", [0, 1, 2])
+def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: Path) -> None:
+    sources = [tmp_path / f"{name}.py" for name in "abc"]
+    for source in sources:
+        source.write_text("x = 1")
+    before = kept_folder("kernels", sources, root=tmp_path)
+    sources[changed].write_text("x = 2")
+    assert kept_folder("kernels", sources, root=tmp_path) not in (before, None)
+
+
+def test_every_file_of_the_part_is_among_the_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[Path] = []
+
+    def noting(kind: str, sources: Iterable[Path], *besides: str, root: Path | None = None) -> Path:
+        seen.extend(sources)
+        return tmp_path
+
+    monkeypatch.setattr(cache, "kept_folder", noting)
+    uncached: Callable[[], Path | None] = kept.cache_folder.__wrapped__
+    assert uncached() == tmp_path
+    folders = [Path(str(module.__file__)).parent for module in (recursion, machine, kinematics)]
+    files = {path for folder in folders for path in folder.glob("*.py")}
+    assert len(files) > 5
+    assert files <= set(seen)
+
+
+def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    owner = tmp_path.stat().st_uid
+    assert cache._unsafe_reason(tmp_path) is None
+    monkeypatch.setattr(cache, "_TRUSTED", (0, owner))
+    monkeypatch.setattr("os.geteuid", lambda: owner + 1)
+    assert str(cache._unsafe_reason(tmp_path)).startswith(f"{tmp_path} belongs to another user")
+
+
+def test_a_folder_is_the_same_until_its_sources_or_anything_beside_them_change(tmp_path: Path) -> None:
+    source = tmp_path / "source.py"
+    source.write_text("a")
+    first = kept_folder("things", [source], "1.0", root=tmp_path)
+    assert first == kept_folder("things", [source], "1.0", root=tmp_path)
+    others = [
+        kept_folder("things", [source], "1.1", root=tmp_path),
+        kept_folder("trees", [source], root=tmp_path),
+    ]
+    source.write_text("b")
+    others.append(kept_folder("things", [source], "1.0", root=tmp_path))
+    assert len({first, *others}) == 4
+    assert all(folder is not None and folder.is_dir() for folder in (first, *others))
+
+
+def test_what_nobody_used_for_a_month_is_deleted_and_nothing_else(tmp_path: Path) -> None:
+    old, recent, other = made(tmp_path, "old"), made(tmp_path, "recent"), made(tmp_path, "old", kind="trees")
+    foreign = tmp_path / "kernels-of-somebody-else"
+    foreign.mkdir()
+    (old / "kernel.nbc").write_bytes(b"compiled")
+    for folder, days in ((old, 30.1), (recent, 29.9), (other, 30.1)):
+        then = time.time() - days * 24 * 3600
+        os.utime(folder / ".used", (then, then))
+    used = made(tmp_path, "new")
+    assert not old.exists()
+    assert set(tmp_path.iterdir()) == {recent, other, foreign, used}
+    assert made(tmp_path, "old", kind="trees") == other
+    assert other.exists()

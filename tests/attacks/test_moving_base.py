@@ -1,7 +1,5 @@
 """A base's rotation means one thing, is kept as it was given, and is brought to Pinocchio by another way."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 
@@ -11,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import urdfkin
+from tests.urdfs import joint, robot
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation, nearest_rotation
@@ -21,10 +20,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.oracle import free_flyer, free_flyer_rates, nearest_quaternion
 
-ARM = (
-    '<robot name="arm"><link name="a"/><link name="b"/><joint name="j" type="continuous"><parent link="a"/>'
-    '<child link="b"/><origin xyz="0.3 0.2 0.1" rpy="1 2 3"/><axis xyz="0.6 0 0.8"/></joint></robot>'
-)
+ARM = robot(joint("j", "continuous", "a", "b", 'xyz="0.3 0.2 0.1" rpy="1 2 3"', "0.6 0 0.8"))
 
 
 def orientations(n: int, seed: int) -> FloatArray:
@@ -43,12 +39,15 @@ def at(R: FloatArray) -> FloatArray:
     return T
 
 
-def test_a_rotation_printed_with_nine_decimals_is_taken() -> None:
+def test_a_rotation_printed_with_nine_decimals_is_taken_and_one_that_is_exact_stays_so() -> None:
     # Of every five such matrices one was refused.
     R = np.round(exp_rotation(np.random.default_rng(0).normal(size=(2000, 3))), 9)
     assert BaseMotion(at(R)).placement.shape == (2000, 4, 4)
     with pytest.raises(InputError, match="the rotation of the base's placement must be a rotation"):
         BaseMotion(at(np.round(R, 8)))
+    turns = np.array([np.eye(3)[list(p)] for p in [(0, 1, 2), (1, 2, 0), (2, 0, 1)]])
+    assert (nearest_rotation(turns) == turns).all()
+    assert (free_flyer(BaseMotion()) == [0, 0, 0, 0, 0, 0, 1]).all()
 
 
 def nearest_at_50_digits(M: FloatArray) -> FloatArray:
@@ -73,13 +72,7 @@ def test_both_sides_take_the_nearest_rotation_to_rounding() -> None:
     assert max(theirs) < 8.0
 
 
-def test_a_rotation_that_is_one_exactly_stays_so() -> None:
-    turns = np.array([np.eye(3)[list(p)] for p in [(0, 1, 2), (1, 2, 0), (2, 0, 1)]])
-    assert (nearest_rotation(turns) == turns).all()
-    assert (free_flyer(BaseMotion()) == [0, 0, 0, 0, 0, 0, 1]).all()
-
-
-def test_the_numbers_are_kept_as_they_were_given() -> None:
+def test_the_numbers_are_kept_as_they_were_given_and_a_free_flyers_are_in_its_own_axes() -> None:
     T = at(orientations(200, 2))
     base = BaseMotion(T, np.arange(6.0))
     assert (base.placement == T).all()
@@ -87,9 +80,6 @@ def test_the_numbers_are_kept_as_they_were_given() -> None:
         assert (again.placement == T).all()
         assert (again.state((200,)) == base.state((200,))).all()
         assert not again.placement.flags.writeable
-
-
-def test_a_free_flyers_rates_are_the_bases_in_its_own_axes() -> None:
     generator = np.random.default_rng(4)
     R, six = orientations(50, 3), generator.normal(size=(50, 6))
     expected = np.einsum("nji,npj->npi", nearest_rotation(R), six.reshape(50, 2, 3)).reshape(50, 6)
@@ -110,22 +100,22 @@ def test_pinocchio_is_not_asked_about_urdfkins_rotation(monkeypatch: pytest.Monk
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
 def test_a_turned_base_stays_well_within_the_bound(reference: str) -> None:
     generator, n = np.random.default_rng(5), 300
-    robot = urdfkin.load(ARM)
+    arm = urdfkin.load(ARM)
     q, v, a = generator.normal(size=(3, n, 1))
     T = at(orientations(n, 6))
     T[:, :3, 3] = generator.normal(size=(n, 3))
     base = BaseMotion(T, *generator.normal(size=(2, n, 6)))
-    robot.placement(q, robot.link_frames, base=base)
-    robot.velocity(q, v, ["a", "b"], reference, base=base)
-    robot.jacobian(q, ["a", "b"], reference, base=base)
-    robot.acceleration(q, v, a, ["a", "b"], reference, base=base)
-    assert robot.certificate().verified
-    assert max(line.share for line in robot.certificate().lines) < 0.2
+    arm.placement(q, arm.link_frames, base=base)
+    arm.velocity(q, v, ["a", "b"], reference, base=base)
+    arm.jacobian(q, ["a", "b"], reference, base=base)
+    arm.acceleration(q, v, a, ["a", "b"], reference, base=base)
+    assert arm.certificate().verified
+    assert max(line.share for line in arm.certificate().lines) < 0.2
 
 
 def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
-    robot = urdfkin.load(ARM)
-    plan, q = robot.plan([0, 1]), np.zeros((1, 1))
+    arm = urdfkin.load(ARM)
+    plan, q = arm.plan([0, 1]), np.zeros((1, 1))
     moved = np.eye(4)
     moved[:3, 3] = 1.0, 2.0, 3.0
     turned = BaseMotion(at(exp_rotation([0.0, 0.0, 1.0])))
@@ -137,17 +127,17 @@ def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
 
 
 def test_the_base_of_each_sample_is_its_own() -> None:
-    robot = urdfkin.load("panda")
+    panda = urdfkin.load("panda")
     generator = np.random.default_rng(7)
-    q, v = robot.sample(6, 0).reshape(2, 3, 8), generator.normal(size=(3, 8))
+    q, v = panda.sample(6, 0).reshape(2, 3, 8), generator.normal(size=(3, 8))
     base = BaseMotion(
         at(exp_rotation(generator.normal(size=(2, 1, 3)))),
         generator.normal(size=(3, 6)),
         generator.normal(size=6),
     )
-    together = robot.acceleration(q, v, v, "panda_hand", base=base, verify="sample")
+    together = panda.acceleration(q, v, v, "panda_hand", base=base, verify="sample")
     for i, j in np.ndindex(2, 3):
         own = BaseMotion(base.placement[i, 0], base.velocity[j], base.acceleration)
-        alone = robot.acceleration(q[i, j], v[j], v[j], "panda_hand", base=own)
+        alone = panda.acceleration(q[i, j], v[j], v[j], "panda_hand", base=own)
         np.testing.assert_allclose(together[i, j], alone, atol=1e-12)
-    assert robot.certificate().verified
+    assert panda.certificate().verified

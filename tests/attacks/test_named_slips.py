@@ -1,7 +1,5 @@
 """Slips that nobody noticed once: each is made again, in a process of its own, and its test must fail."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,12 +1,8 @@
 """Names that look like ours: each stands for one frame, the same to urdfkin and to Pinocchio, or for none."""
 
-from __future__ import annotations
-
 import copy
 import pickle
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pytest
@@ -15,10 +11,11 @@ from hypothesis import strategies as st
 
 import urdfkin
 from scripts.fuzzing.robots import LIKE_OURS as POOL
+from tests.urdfs import joint, limit, loaded
+from tests.urdfs import robot as urdf
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError, OracleError, UnknownNameError
 from urdfkin.model.tree import JointFrame, KinematicTree, LinkFrame
-from urdfkin.robot import Robot
 from urdfkin.validation.accuracy import judge
 from urdfkin.verify.oracle import QueryBatch
 
@@ -29,39 +26,14 @@ ASKED = (*POOL, *(f"{prefix}:{name}" for prefix in ("link", "joint") for name in
 TURNED = np.array([[0.0, -1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 3.0], [0.0, 0.0, 0.0, 1.0]])
 
 
-@contextmanager
-def quiet() -> Iterator[None]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        yield
-
-
-def urdf(joints: list[tuple[str, str, str, str, tuple[float, float, float]]], root: str) -> str:
-    """A robot of (name, kind, parent, child, xyz)."""
-    rows = [
-        f'<link name="{child}"/><joint name="{name}" type="{kind}"><parent link="{parent}"/>'
-        f'<child link="{child}"/><origin xyz="{x!r} {y!r} {z!r}"/><axis xyz="0 0 1"/></joint>'
-        for name, kind, parent, child, (x, y, z) in joints
-    ]
-    return f'<robot name="r"><link name="{root}"/>{"".join(rows)}</robot>'
-
-
-def loaded(text: str, **words: str | None) -> Robot:
-    with quiet():
-        return urdfkin.load(text, **words)  # type: ignore[arg-type]
-
-
 #: Link `foo` and link `link:foo`, at (1, 0, 0) and at (1, 2, 0).
 LIKE_OURS = urdf(
-    [
-        ("j1", "continuous", "base", "foo", (1.0, 0.0, 0.0)),
-        ("j2", "continuous", "foo", "link:foo", (0.0, 2.0, 0.0)),
-    ],
-    "base",
+    joint("j1", "continuous", "base", "foo", 'xyz="1 0 0"'),
+    joint("j2", "continuous", "foo", "link:foo", 'xyz="0 2 0"'),
 )
 
 
-def test_an_exact_name_wins() -> None:
+def test_an_exact_name_wins_and_a_link_frame_is_that_link() -> None:
     robot = loaded(LIKE_OURS)
     for base in (None, BaseMotion()):
         assert robot.placement([0.0, 0.0], "link:foo", base=base)[:3, 3].tolist() == [1.0, 2.0, 0.0]
@@ -69,9 +41,6 @@ def test_an_exact_name_wins() -> None:
         assert robot.placement([0.0, 0.0], "foo", base=base)[:3, 3].tolist() == [1.0, 0.0, 0.0]
         assert robot.placement([0.0, 0.0], LinkFrame.of("foo"), base=base)[:3, 3].tolist() == [1.0, 0.0, 0.0]
     assert robot.certificate().verified
-
-
-def test_a_placement_relative_to_a_link_frame_is_relative_to_that_link() -> None:
     robot = loaded(LIKE_OURS)
     seen = robot.relative_placement([0.0, 0.0], "base", LinkFrame.of("foo"))
     assert seen[:3, 3].tolist() == [-1.0, 0.0, 0.0]
@@ -102,17 +71,13 @@ def test_a_prepared_frame_is_not_taken_for_another_of_its_text() -> None:
     assert again.placement(q)[1, 3] == 0.0
 
 
-def test_every_frame_of_all_frames_stands_for_itself() -> None:
+def test_every_frame_of_all_frames_stands_for_itself_also_in_a_validation() -> None:
     robot = loaded(LIKE_OURS)
     assert robot.all_frames == ("link:base", "link:foo", "link:link:foo", "joint:j1", "joint:j2")
     assert [robot.tree.frame_link(frame) for frame in robot.all_frames] == [0, 1, 2, 1, 2]
     for copied in (copy.deepcopy(robot.all_frames), pickle.loads(pickle.dumps(robot.all_frames))):
         assert [robot.tree.frame_link(frame) for frame in copied] == [0, 1, 2, 1, 2]
-
-
-def test_a_validation_and_the_judge_tell_such_links_apart() -> None:
-    with quiet():
-        assert urdfkin.validate([LIKE_OURS.encode()], samples=2).passed
+    assert urdfkin.validate([LIKE_OURS.encode()], samples=2).passed
     lines = judge(loaded(LIKE_OURS), samples=1).lines
     assert max(line.pinocchio.worst for line in lines) < 10.0
 
@@ -122,6 +87,10 @@ def test_a_robot_whose_link_and_joint_share_a_name_moves_on_its_base(name: str) 
     robot = urdfkin.load(name)
     shared = {joint.name for joint in robot.tree.joints} & set(robot.link_names)
     assert shared
+    assert robot.velocity(robot.neutral(), np.ones(robot.nv), robot.link_frames).shape == (
+        len(robot.link_names),
+        6,
+    )
     q, base = robot.sample(2, 3), BaseMotion(TURNED, np.arange(6.0), np.arange(6.0) - 2.0)
     everywhere = robot.placement(q, robot.link_frames, base=base)
     np.testing.assert_allclose(everywhere, TURNED @ robot.placement(q, robot.link_frames), atol=1e-14)
@@ -144,20 +113,12 @@ def test_the_world_and_the_root_joint_move_with_the_base(root_joint: str) -> Non
     assert robot.certificate().verified
 
 
-@pytest.mark.parametrize("name", ["anymal_c", "so100"])
-def test_all_links_are_had_without_naming_them(name: str) -> None:
-    robot = urdfkin.load(name)
-    assert robot.placement(robot.neutral(), robot.link_frames).shape == (len(robot.link_names), 4, 4)
-    assert robot.velocity(robot.neutral(), np.ones(robot.nv), robot.link_frames).shape == (
-        len(robot.link_names),
-        6,
-    )
-    assert robot.certificate().verified
-
-
 def test_the_remedy_for_an_ambiguous_name_works() -> None:
-    crossed = [("b", "fixed", "a", "link:b", (1.0, 0.0, 0.0)), ("c", "fixed", "link:b", "b", (0.0, 1.0, 0.0))]
-    robot = loaded(urdf(crossed, "a"))
+    crossed = (
+        joint("b", "fixed", "a", "link:b", 'xyz="1 0 0"'),
+        joint("c", "fixed", "link:b", "b", 'xyz="0 1 0"'),
+    )
+    robot = loaded(urdf(*crossed))
     with pytest.raises(InputError, match=r"write 'joint:c' or 'joint:b'$"):
         robot.placement([], "b")
     assert robot.placement([], "joint:c")[:2, 3].tolist() == [1.0, 1.0]
@@ -202,8 +163,9 @@ def test_of_hostile_names_every_one_stands_for_the_same_frame_on_both_sides(
         kind = data.draw(st.sampled_from(["continuous", "fixed", "prismatic"]))
         step = np.roll([10.0**-k, 0.0, 0.0], k)
         places.append(places[parent] + step)
-        rows.append((joints[k], kind, links[parent], links[k + 1], tuple(step.tolist())))
-    text = urdf(rows, links[0]).replace("</joint>", '<limit effort="1" velocity="1"/></joint>')
+        origin = f'xyz="{" ".join(map(str, step))}"'
+        rows.append(joint(joints[k], kind, links[parent], links[k + 1], origin, more=limit(0, 0)))
+    text = urdf(*rows) if rows else f'<robot name="r"><link name={quoteattr(links[0])}/></robot>'
     robot = loaded(text, root_joint=root_joint)
     if root_joint is not None:
         links, joints = ["universe", *links], ["root_joint", *joints]

@@ -1,7 +1,5 @@
 """Whatever is handed to a public argument, the answer is a result or one of urdfkin's own errors."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import os
@@ -16,6 +14,8 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.urdfs import joint, limit
+from tests.urdfs import robot as robot_of
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import LANES
 from urdfkin.robot import Robot
@@ -50,12 +50,8 @@ ODD: dict[str, Any] = {
     "a long text": "x" * 10_000,
 }
 
-ARM = (
-    '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
-    '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
-    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-    '<joint name="k" type="continuous"><parent link="b"/><child link="c"/><origin xyz="1 0 0"/>'
-    '<axis xyz="0 1 0"/></joint></robot>'
+ARM = robot_of(
+    joint("j", "revolute", "a", "b", more=limit()), joint("k", "continuous", "b", "c", 'xyz="1 0 0"', "0 1 0")
 )
 #: Good arguments for every parameter without a default.
 GOOD: dict[str, Any] = {

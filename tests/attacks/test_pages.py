@@ -4,8 +4,6 @@ Where a form can be parsed, its skeleton (what there is besides the words) is co
 thing under tame names: whatever a name adds is found, also what nobody thought of.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 import re
@@ -14,7 +12,6 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any, cast
 
@@ -26,6 +23,7 @@ from markdown_it import MarkdownIt
 import urdfkin
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from tests.attacks.test_exported_names import code_alone
+from tests.markup import Page
 from urdfkin.dh import DHTable, export
 from urdfkin.dh.parse_table import read_table
 from urdfkin.dh.tree_parameters import document, tree_parameters
@@ -42,50 +40,7 @@ from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION, Document
 from urdfkin.view.dh_drawing import drawing
 
-pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.urdf.findings.UrdfWarning")
-
-Skeleton = list[tuple[str, tuple[str, ...]]]
-
-
-class _Elements(HTMLParser):
-    """Tags with the names of their attributes, comments and instructions, and the text of scripts."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.found: Skeleton = []
-        self.scripts: list[str] = []
-        self.words = ""
-        self._script = self._code = False
-        self.feed(page)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found.append((tag, tuple(name for name, _ in attrs)))
-        self._script = tag == "script"
-        self._code = self._code or tag == "code"
-
-    def handle_endtag(self, tag: str) -> None:
-        self.found.append((f"/{tag}", ()))
-        self._script = False
-        self._code = self._code and tag != "code"
-
-    def handle_data(self, data: str) -> None:
-        if self._script:
-            self.scripts.append(data)
-        elif not self._code:
-            self.words += data
-
-    def handle_comment(self, data: str) -> None:
-        self.found.append(("comment", ()))
-
-    def handle_decl(self, decl: str) -> None:
-        self.found.append(("declaration", ()))
-
-    def handle_pi(self, data: str) -> None:
-        self.found.append(("instruction", ()))
-
-    def unknown_decl(self, data: str) -> None:
-        self.found.append(("declaration", ()))
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.urdf.findings.UrdfWarning")]
 
 
 def tame(name: str) -> str:
@@ -129,31 +84,28 @@ def report(called: Callable[[str], str]) -> Document:
     return cast("Document", json.loads(_report(called)))
 
 
-@pytest.mark.slow
-def test_a_report_of_hostile_names_fits_the_schema() -> None:
+def test_a_report_fits_the_schema_and_its_page_and_junit_have_the_same_elements_under_any_names() -> None:
     jsonschema.validate(report(same), VALIDATION.schema())
-
-
-@pytest.mark.slow
-def test_a_page_has_the_same_elements_attributes_and_scripts_under_any_names() -> None:
-    hostile, plain = (_Elements(as_html(report(called))) for called in (same, tame))
-    assert hostile.found == plain.found
+    hostile, plain = (Page(as_html(report(called))) for called in (same, tame))
+    assert hostile.skeleton == plain.skeleton
     data = [script for script in hostile.scripts if script.lstrip().startswith(("{", "["))]
     assert data, "the page's data"
     links = [json.loads(script)["links"] for script in data if '"links"' in script]
     assert links == [["base", *IN_XML.values()]]
     code = [[s for s in page.scripts if not s.lstrip().startswith(("{", "["))] for page in (hostile, plain)]
     assert code[0] == code[1]
+    trees = [etree.fromstring(as_junit(report(called))) for called in (same, tame)]
+    skeletons = [[(element.tag, sorted(element.attrib)) for element in tree.iter()] for tree in trees]
+    assert skeletons[0] == skeletons[1]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("html", [True, False])
 def test_a_comment_in_markdown_has_the_same_elements_under_any_names(html: bool) -> None:
     for write in (as_markdown, _compared):
         hostile, plain = (write(report(called)) for called in (same, tame))
         assert hostile.count("\n") == plain.count("\n")
-        assert rendered(hostile, html).found == rendered(plain, html).found
-        assert not re.search(r"@\w|://|www\.|#\d", rendered(hostile, html).words)
+        assert rendered(hostile, html).skeleton == rendered(plain, html).skeleton
+        assert not re.search(r"@\w|://|www\.|#\d", rendered(hostile, html).prose)
 
 
 def _compared(document: Document) -> str:
@@ -162,16 +114,9 @@ def _compared(document: Document) -> str:
     return markdown_of(document, empty, compare(document, empty))
 
 
-@pytest.mark.slow
-def test_junit_has_the_same_elements_and_attributes_under_any_names() -> None:
-    trees = [etree.fromstring(as_junit(report(called))) for called in (same, tame)]
-    skeletons = [[(element.tag, sorted(element.attrib)) for element in tree.iter()] for tree in trees]
-    assert skeletons[0] == skeletons[1]
-
-
-def rendered(text: str, html: bool) -> _Elements:
+def rendered(text: str, html: bool) -> Page:
     parser = MarkdownIt("commonmark", {"html": html}).enable(["table", "strikethrough"])
-    return _Elements(str(parser.render(text)))
+    return Page(str(parser.render(text)))
 
 
 # -- tables ------------------------------------------------------------------------------------------
@@ -187,36 +132,40 @@ def table(name: str) -> DHTable:
     return replace(_table(), robot=name, base_frame=name, tip_frame=name, rows=rows)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", IN_XML)
 def test_what_was_snapped_is_told_with_names_as_words(kind: str) -> None:
-    def page(name: str) -> _Elements:
+    def page(name: str) -> Page:
         text = urdf(name).replace('<origin xyz="0.3 0 0"/>', '<origin xyz="0.3 0 0" rpy="1.5708 0 0"/>')
         snapped = urdfkin.load(text).dh(snap=1e-3)
         assert snapped.snap is not None
         assert snapped.snap.changes
         return rendered(export(snapped, "markdown"), True)
 
-    assert page(IN_XML[kind]).found == page("tame_name").found
+    assert page(IN_XML[kind]).skeleton == page("tame_name").skeleton
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("html", [True, False])
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_table_in_markdown_has_the_same_elements_under_any_name(kind: str, html: bool) -> None:
     hostile, plain = (rendered(export(table(name), "markdown"), html) for name in (NAMES[kind], "tame_name"))
-    assert hostile.found == plain.found
-    assert not re.search(r"@\w|://|www\.", hostile.words)
+    assert hostile.skeleton == plain.skeleton
+    assert not re.search(r"@\w|://|www\.", hostile.prose)
 
 
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_name_in_markdown_is_code_and_prose_is_prose(kind: str) -> None:
     name = NAMES[kind]
     cell = rendered(f"| a | b |\n| --- | --- |\n| {markdown_code(name)} | x |\n", True)
-    assert [tag for tag, _ in cell.found if tag in ("td", "code", "tr")] == ["tr", "tr", "td", "code", "td"]
+    assert [tag for tag, _ in cell.skeleton if tag in ("td", "code", "tr")] == [
+        "tr",
+        "tr",
+        "td",
+        "code",
+        "td",
+    ]
     prose = rendered(markdown_text(name), True)
-    assert prose.found == [("p", ()), ("/p", ())]
-    assert not re.search(r"@\w|://|www\.|#\d", prose.words)
+    assert prose.skeleton == [("p", ()), ("/p", ())]
+    assert not re.search(r"@\w|://|www\.|#\d", prose.prose)
 
 
 @pytest.mark.parametrize("form", ["markdown", "terminal"])
@@ -228,7 +177,7 @@ def test_the_whole_tree_has_the_same_lines_under_any_names(form: str) -> None:
     assert texts[0].count("\n") == texts[1].count("\n")
     if form == "markdown":
         hostile, plain = (rendered(text, True) for text in texts)
-        assert hostile.found == plain.found
+        assert hostile.skeleton == plain.skeleton
 
 
 @pytest.mark.parametrize("kind", NAMES)
@@ -239,7 +188,6 @@ def test_a_name_in_latex_is_words(kind: str) -> None:
     assert lines[0] == lines[1]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("form", ["sympy", "roboticstoolbox", "ets"])
 @pytest.mark.parametrize("kind", NAMES)
 def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
@@ -255,7 +203,6 @@ def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
     assert code(NAMES[kind]) == code("tame_name")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", NAMES)
 def test_code_with_a_proof_is_the_same_under_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
     def code(name: str) -> list[str]:
@@ -288,7 +235,6 @@ def test_matlab_code_is_the_same_under_any_name(kind: str, form: str) -> None:
     assert code(NAMES[kind]) == code("tame_name")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("form", ["json", "toml", "csv"])
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_table_that_is_read_back_has_its_names(kind: str, form: str, tmp_path: Path) -> None:
@@ -309,7 +255,6 @@ def test_no_spreadsheet_takes_a_name_for_a_formula(name: str) -> None:
         assert from_csv_cell(cell) == name
 
 
-@pytest.mark.slow
 def test_a_drawing_has_names_as_words_alone() -> None:
     def elements(called: Callable[[str], str]) -> list[Any]:
         names = [called(name) for name in IN_XML.values()]
@@ -324,7 +269,6 @@ def test_a_drawing_has_names_as_words_alone() -> None:
     assert elements(same) == elements(tame)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["J$$(x)", "$x^2$", "J$$", r"$\frac{", r"\$x$"])
 def test_dollars_in_a_name_are_no_mathematics(name: str) -> None:
     svg = etree.fromstring(drawing(table(name)).encode())

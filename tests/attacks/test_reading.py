@@ -3,12 +3,11 @@
 The device here is /dev/zero: who reads it to its end runs out of memory.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import os
 import resource
+import subprocess
 import time
 import zipfile
 from collections.abc import Iterator
@@ -18,6 +17,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import refused
 from tests.cli.running import urdfkin as command
 from urdfkin.errors import SourceError
 from urdfkin.robot.trajectory import read_arrays
@@ -27,8 +27,11 @@ from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
 from urdfkin.system.git import version_before
 from urdfkin.urdf import mjcf, xacro
 from urdfkin.urdf.catalogue import find_package
+from urdfkin.validation.accuracy_store import AccuracyResult
 from urdfkin.validation.campaign import StoreWarning, validate
 from urdfkin.validation.store import Store
+from urdfkin.view import scene
+from urdfkin.view.scene import shapes
 
 PACKAGE = Path(urdfkin.__file__).parent
 
@@ -84,17 +87,24 @@ def test_no_module_but_the_reader_opens_files_that_a_stranger_may_have_put_there
     assert found == set(OTHERS)
 
 
-@pytest.mark.parametrize("kind", ["a device", "a link to a device", "a pipe", "a socket's folder"])
-def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
-    path = tmp_path / "x"
+def odd_file(kind: str, path: Path) -> Path:
+    """What is no regular file, or too large, at a path or elsewhere."""
     if kind == "a device":
-        path = Path("/dev/zero")
-    elif kind == "a link to a device":
+        return Path("/dev/zero")
+    if kind == "a link to a device":
         path.symlink_to("/dev/zero")
     elif kind == "a pipe":
         os.mkfifo(path)
-    else:
+    elif kind == "a folder":
         path.mkdir()
+    else:
+        path.write_bytes(bytes(xacro.MOST_ARGUMENTS + 1))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["a device", "a link to a device", "a pipe", "a folder"])
+def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
+    path = odd_file(kind, tmp_path / "x")
     for read in (read_bytes, read_if_there):
         with pytest.raises(
             SourceError, match=r"not a regular file: found a (character device|pipe)|directory"
@@ -118,23 +128,15 @@ def test_settings_that_are_a_link_to_a_device_are_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "pyproject.toml").symlink_to("/dev/zero")
-    done = command("check", "ur5")
-    assert done.code == 2
-    assert "pyproject.toml: not a regular file: found a character device" in done.err
+    assert "pyproject.toml: not a regular file: found a character device" in refused("check ur5")
 
 
-def test_a_packages_manifest_that_is_a_link_to_a_device_is_none(tmp_path: Path) -> None:
+def test_a_manifest_a_kept_file_or_a_pipe_in_place_of_a_file_is_none(tmp_path: Path) -> None:
     (tmp_path / "package.xml").symlink_to("/dev/zero")
     assert find_package("arm", tmp_path / "arm.urdf", {}) is None
-
-
-def test_a_kept_file_that_is_a_link_to_a_device_is_damaged(tmp_path: Path) -> None:
     (tmp_path / "kernel").symlink_to("/dev/zero")
     with pytest.warns(UserWarning, match="is damaged and is computed again: a character device"):
         assert get(tmp_path / "kernel") is None
-
-
-def test_a_pipe_that_is_called_as_an_mjcf_file_holds_nobody_up(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "arm.xml")
     assert not mjcf.is_mjcf(tmp_path / "arm.xml")
 
@@ -159,13 +161,11 @@ def test_a_stores_file_that_is_a_link_to_a_device_is_not_read(name: str, tmp_pat
             assert validate("planar_two_link", samples=10, store=tmp_path).passed
         assert not place.is_symlink()
         return
-    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
-
     assert AccuracyResult.of(Store.reading(tmp_path, said.append)) is None
     assert "no accuracy results" in said[0]
 
 
-def test_a_stores_lock_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path: Path) -> None:
+def test_a_stores_lock_or_folder_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path: Path) -> None:
     mine, store = tmp_path / "mine", tmp_path / "store"
     mine.write_text("precious")
     store.mkdir()
@@ -175,10 +175,7 @@ def test_a_stores_lock_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path:
     ):
         validate("planar_two_link", samples=10, store=store)
     assert mine.read_text() == "precious"
-
-
-def test_a_stores_folder_for_writing_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path: Path) -> None:
-    mine, store = tmp_path / "mine", tmp_path / "store"
+    mine, store = tmp_path / "my folder", tmp_path / "other store"
     (mine / "all").mkdir(parents=True)
     (mine / "all" / "file").write_text("precious")
     store.mkdir()
@@ -217,19 +214,14 @@ XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["a device", "a pipe", "a large file"])
+@pytest.mark.parametrize("kind", ["a link to a device", "a pipe", "a large file"])
 def test_what_a_xacro_file_includes_is_read_nowhere_but_in_the_confined_process(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its arguments are not known then, and nothing is refused."""
-    arm, part = tmp_path / "arm.xacro", tmp_path / "part.xacro"
+    arm = tmp_path / "arm.xacro"
     arm.write_text(XACRO)
-    if kind == "a device":
-        part.symlink_to("/dev/zero")
-    elif kind == "a pipe":
-        os.mkfifo(part)
-    else:
-        part.write_bytes(bytes(xacro.MOST_ARGUMENTS + 1))
+    odd_file(kind, tmp_path / "part.xacro")
 
     def refuse(*_: object, **__: object) -> bytes:
         raise AssertionError("read by the caller's process")
@@ -242,9 +234,7 @@ def test_what_a_xacro_file_includes_is_read_nowhere_but_in_the_confined_process(
 @pytest.mark.parametrize("word", ["a", "a=1", ":=1"])
 def test_a_xacro_argument_without_a_name_and_a_value_is_refused(word: str, tmp_path: Path) -> None:
     (tmp_path / "arm.xacro").write_text(XACRO)
-    done = command("info", str(tmp_path / "arm.xacro"), "--xacro-arg", word)
-    assert done.code == 2
-    assert "NAME:=VALUE" in done.err
+    assert "NAME:=VALUE" in refused("info", str(tmp_path / "arm.xacro"), "--xacro-arg", word)
 
 
 # -- git ------------------------------------------------------------------------------------------------
@@ -253,8 +243,6 @@ def test_a_xacro_argument_without_a_name_and_a_value_is_refused(word: str, tmp_p
 def test_an_older_version_that_is_too_large_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import subprocess  # noqa: PLC0415
-
     def git(*words: str) -> None:
         who = ("-c", "user.name=a", "-c", "user.email=a@b")
         subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
@@ -296,9 +284,6 @@ def test_what_a_mesh_names_is_read_from_regular_files_of_its_own_folder(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("trimesh")
-    from urdfkin.view import scene  # noqa: PLC0415
-    from urdfkin.view.scene import shapes  # noqa: PLC0415
-
     folder = tmp_path / "mesh"
     folder.mkdir()
     (tmp_path / "outside.mtl").write_text("newmtl m\nKd 1 0 0\n")

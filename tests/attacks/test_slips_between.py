@@ -1,7 +1,5 @@
 """No slip between a user's numbers and the result is verified, and none blinds the check."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable
 

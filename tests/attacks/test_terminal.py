@@ -1,20 +1,19 @@
 """Nothing that a file brings acts on a terminal or a log: every command, on hostile names."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
-from tests.cli.running import Done, urdfkin
+from tests.cli.running import Done, good, python, urdfkin
 from urdfkin.cli import commands
 from urdfkin.cli.paths import SCREW_FORMATS as SCREWS
 from urdfkin.cli.streams import SafeStream
@@ -24,85 +23,69 @@ from urdfkin.export import LANGUAGES
 #: A file may be called so.
 FILE = "\x1b[31m\n::error::forged\u202e ##vso[x]"
 
+#: Lines after each command and its robot. Words in capitals are hostile files and names.
 ROBOT = {
-    "info": [[], ["--format", "json"]],
-    "order": [[], ["--format", "csv"], ["--from", "isaaclab", "--format", "json"], ["--to", FILE]],
+    "info": ["", "--format json"],
+    "order": ["", "--format csv", "--from isaaclab --format json", "--to FILE"],
     "readers": [
-        ["--with", "yourdfpy"], ["--with", "yourdfpy", "--format", "json"],
-        ["--with", "yourdfpy", "--format", "csv"], ["--with", FILE],
+        "--with yourdfpy", "--with yourdfpy --format json", "--with yourdfpy --format csv", "--with FILE",
     ],
     "placement": [
-        [], ["--format", "json"], ["--format", "csv"], ["--frame", "FRAME"], ["--relative-to", "FRAME"],
-        ["--as", "rpy"], ["--base-placement", FILE], ["--trajectory", FILE], ["--convention", FILE],
+        "", "--format json", "--format csv", "--frame FRAME", "--relative-to FRAME", "--as rpy",
+        "--base-placement FILE", "--trajectory FILE", "--convention FILE",
     ],
-    "analytical-jacobian": [[], ["--format", "csv"], ["--representation", FILE]],
-    "chain": [["--no-mimic"], ["--format", "json"], ["--format", "csv"], ["--base", FILE]],
-    "velocity": [[], ["--q", "random:3"], ["--q", "\x1b[31mx"]],
-    "jacobian": [[], ["--format", "json"], ["--format", "csv"], ["--frame", FILE]],
-    "jacobian-rate": [[], ["--format", "csv"]],
-    "hessian": [[], ["--format", "csv"]],
-    "imu": [[], ["--format", "csv"], *(["--trajectory", file] for file in (FILE, f"{FILE}.npz"))],
-    "singular-values": [
-        [], ["--format", "csv"], ["--format", "json"], ["--frame", FILE], ["--trajectory", FILE],
-    ],
-    "acceleration": [
-        [], ["--breakdown", "--v", "random"], ["--breakdown", "--v", "random", "--format", "csv"],
-    ],
+    "analytical-jacobian": ["", "--format csv", "--representation FILE"],
+    "chain": ["--no-mimic", "--format json", "--format csv", "--base FILE"],
+    "velocity": ["", "--q random:3", "--q COLOUR"],
+    "jacobian": ["", "--format json", "--format csv", "--frame FILE"],
+    "jacobian-rate": ["", "--format csv"],
+    "hessian": ["", "--format csv"],
+    "imu": ["", "--format csv", "--trajectory FILE", "--trajectory ARCHIVE"],
+    "singular-values": ["", "--format csv", "--format json", "--frame FILE", "--trajectory FILE"],
+    "acceleration": ["", "--breakdown --v random", "--breakdown --v random --format csv"],
     "dh": [
-        *(["--format", form, "--no-mimic"] for form in (*FORMATS, "urdf", "svg")),
-        *(["--tree", "--format", form] for form in ("terminal", "markdown", "csv", "json")),
-        ["--flip", FILE], ["--near-parallel", "strict"],
+        *(f"--format {form} --no-mimic" for form in (*FORMATS, "urdf", "svg")),
+        *(f"--tree --format {form}" for form in ("terminal", "markdown", "csv", "json")),
+        "--flip FILE", "--near-parallel strict",
     ],
-    "screws": [["--no-mimic", "--format", form] for form in SCREWS] + [["--base", FILE]],
-    "calibrate": [[], ["--fit", FILE], ["--poses", FILE], ["--ur", FILE], ["--tip", FILE]],
-    "structure": [[], ["--format", "json"], ["--opw", "1"]],
-    "export": [["--no-mimic", "--to", form] for form in LANGUAGES] + [["--to", "c", "--frame", FILE]],
-    "check": [["--format", form] for form in ("terminal", "concise", "json", "sarif", "github")]
-    + [["--each"], ["--statistics"], ["--diff"]]
-    + [[option, FILE] for option in ("--baseline", "--changed-since", "--config", "--select")],
-    "validate": [["--samples", "2", "--cases"], ["--samples", "1", "--isolate"]],
-    "plot": [
-        ["--to", "neutral", "--frame", NAMES["math"], "--output", "PICTURE"],
-        ["--to", FILE, "--output", "PICTURE"],
+    "screws": [*(f"--no-mimic --format {form}" for form in SCREWS), "--base FILE"],
+    "calibrate": ["", "--fit FILE", "--poses FILE", "--ur FILE", "--tip FILE"],
+    "structure": ["", "--format json", "--opw 1"],
+    "export": [*(f"--no-mimic --to {form}" for form in LANGUAGES), "--to c --frame FILE"],
+    "check": [
+        *(f"--format {form}" for form in ("terminal", "concise", "json", "sarif", "github")),
+        "--each", "--statistics", "--diff", "--baseline FILE", "--changed-since FILE", "--config FILE",
+        "--select FILE",
     ],
+    "validate": ["--samples 2 --cases", "--samples 1 --isolate"],
+    "plot": ["--to neutral --frame MATH --output PICTURE", "--to FILE --output PICTURE"],
 }  # fmt: skip
-OTHERS: dict[str, list[list[str]]] = {
-    "robots": [[], ["--format", "json"], ["--family", FILE]],
-    "explain": [["URDF502"], ["7.130"], [FILE]],
+OTHERS = {
+    "robots": ["", "--format json", "--family FILE"],
+    "explain": ["URDF502", "7.130", "FILE"],
     "report": [
-        ["REPORT"],
-        ["REPORT", "--cases"],
-        [FILE],
-        ["compare", "REPORT", "REPORT"],
-        ["compare", "REPORT", "REPORT", "--format", "json"],
-        ["compare", "REPORT", FILE],
-        ["history", "REPORT"],
-        ["history", "REPORT", "--format", "json"],
-        ["history", FILE],
-        ["status", FILE],
-        ["merge", FILE, FILE],
+        "REPORT", "REPORT --cases", "FILE", "compare REPORT REPORT", "compare REPORT REPORT --format json",
+        "compare REPORT FILE", "history REPORT", "history REPORT --format json", "history FILE",
+        "status FILE", "merge FILE FILE",
     ],
-    "same": [["ROBOT", "ROBOT"], ["ROBOT", "elbow"], ["ROBOT", "ROBOT", "--format", "json"], ["ROBOT", FILE]],
-    "diff": [
-        ["ROBOT", "elbow", "--no-effects"],
-        ["ROBOT", "elbow", "--no-effects", "--format", "json"],
-        ["ROBOT", FILE],
-    ],
-    "verify": [
-        [FILE, "ROBOT"],
-        [f"{FILE}.py:{FILE}", "ROBOT"],
-        ["echo '\x1b[31m::error::forged'", "ROBOT", "--program", "--samples", "0"],
-    ],
+    "same": ["ROBOT ROBOT", "ROBOT elbow", "ROBOT ROBOT --format json", "ROBOT FILE"],
+    "diff": ["ROBOT elbow --no-effects", "ROBOT elbow --no-effects --format json", "ROBOT FILE"],
+    "verify": ["FILE ROBOT", "FUNCTION ROBOT", "PROGRAM ROBOT --program --samples 0"],
     "vectors": [
-        ["write", "FOLDER", "ROBOT"],
-        ["write", "FOLDER", "ROBOT", "--format", "json"],
-        ["write", "FOLDER", "ROBOT", "--format", "csv"],
-        ["write", FILE, FILE],
+        "write FOLDER ROBOT", "write FOLDER ROBOT --format json", "write FOLDER ROBOT --format csv",
+        "write FILE FILE",
     ],
-    "view": [[FILE]],
-    "warm": [[], [FILE]],
-    "completion": [["bash"], ["zsh"], ["fish"], [FILE]],
-}
+    "view": ["FILE"],
+    "warm": ["", "FILE"],
+    "completion": ["bash", "zsh", "fish", "FILE"],
+}  # fmt: skip
+WORDS = {
+    "FILE": FILE, "ARCHIVE": f"{FILE}.npz", "FUNCTION": f"{FILE}.py:{FILE}", "FRAME": NAMES["line"],
+    "COLOUR": "\x1b[31mx", "MATH": NAMES["math"], "PROGRAM": "echo '\x1b[31m::error::forged'",
+}  # fmt: skip
+BREAKDOWN = "acceleration --breakdown --v random"
+LINES = [f"{command} ROBOT {more}" for command, lines in ROBOT.items() for more in lines]
+LINES += [f"{command} {more}" for command, lines in OTHERS.items() for more in lines]
 
 
 @pytest.fixture(scope="module")
@@ -112,8 +95,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder.mkdir()
     made = {name: str(folder / f"{FILE}{ending}") for name, ending in ENDINGS.items()}
     Path(made["ROBOT"]).write_text(chain_of_all(), encoding="utf-8")
-    done = urdfkin("validate", made["ROBOT"], "--samples", "1", "--json", made["REPORT"])
-    assert done.code == 0, done.err
+    good("validate", made["ROBOT"], "--samples", "1", "--json", made["REPORT"])
     report = json.loads(Path(made["REPORT"]).read_text())
     entry = report["robots"][0]
     entry["source"] = NAMES["colours"] + NAMES["line"]
@@ -130,7 +112,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     report |= {"asked": 2, "verdict": "bad input", "reason": "1 of 2 robots has bad input"}
     report["command"], report["started"] = NAMES["colours"], NAMES["erased"]
     Path(made["REPORT"]).write_text(json.dumps(report))
-    return made | {"FRAME": NAMES["line"]}
+    return made | WORDS
 
 
 def table_of(names: list[str]) -> str:
@@ -160,12 +142,12 @@ def acts(text: str, *, commands: bool = False) -> list[str]:
     return found + [line for line in lines if line.startswith("::") and not (commands and ours.match(line))]
 
 
-def run(files: dict[str, str], words: list[str]) -> Done:
-    return urdfkin(*(files.get(word, word) for word in words))
+def run(files: dict[str, str], line: str) -> Done:
+    return urdfkin(*(files.get(word, word) for word in line.split()))
 
 
-def harmless(done: Done, words: list[str]) -> None:
-    assert acts(done.text, commands="github" in words) == []
+def harmless(done: Done, line: str = "") -> None:
+    assert acts(done.text, commands="github" in line) == []
     assert acts(done.err) == []
     assert "Traceback" not in done.err
 
@@ -175,13 +157,11 @@ def test_every_command_is_tried() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "words",
-    [[c, "ROBOT", *more] for c, lists in ROBOT.items() for more in lists],
-    ids=lambda w: ascii(" ".join(w)),
-)
-def test_no_name_acts_on_the_terminal(words: list[str], files: dict[str, str]) -> None:
-    harmless(run(files, words), words)
+@pytest.mark.parametrize("line", LINES)
+def test_no_name_and_no_word_of_the_command_line_acts_on_the_terminal(
+    line: str, files: dict[str, str]
+) -> None:
+    harmless(run(files, line), line)
 
 
 @pytest.mark.slow
@@ -194,23 +174,15 @@ def test_no_name_of_a_table_or_of_what_it_is_held_against_acts(part: int, fit: s
     robot.write_text(chain_of_all(names), encoding="utf-8")
     table.write_text(table_of([NAMES["colours"], *names[1:]]), encoding="utf-8")
     done = urdfkin("dh", str(robot), "--compare", str(table), fit)
-    harmless(done, [])
+    harmless(done)
     assert "DIFFERS" in done.text
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "words", [[c, *more] for c, lists in OTHERS.items() for more in lists], ids=lambda w: ascii(" ".join(w))
-)
-def test_no_word_of_a_report_or_of_the_command_line_acts(words: list[str], files: dict[str, str]) -> None:
-    harmless(run(files, words), words)
 
 
 @pytest.mark.parametrize("command", [*commands(), "no such command"])
 def test_no_name_of_a_file_or_an_option_acts(command: str) -> None:
     for words in ([command, f"--{FILE}"], [command, f"{FILE}.urdf"], [f"{command}{FILE}"]):
         if words != ["explain", f"{FILE}.urdf"]:
-            harmless(urdfkin(*words), words)
+            harmless(urdfkin(*words))
 
 
 @pytest.mark.slow
@@ -218,32 +190,25 @@ def test_no_name_of_a_file_or_an_option_acts(command: str) -> None:
 def test_each_name_alone_adds_no_line(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As many lines as for a robot with tame names of that length: a name is one line, or part of one."""
     monkeypatch.setenv("COLUMNS", "10000")
-    lines: list[list[int]] = []
+    counts: list[list[int]] = []
+    lines = "info", "jacobian", "dh", "dh --format markdown", "dh --tree", "dh --format c", BREAKDOWN
     for name in (IN_XML[kind], "x" * len(IN_XML[kind].encode("unicode_escape"))):
-        path = tmp_path / f"{len(lines)}.urdf"
+        path = tmp_path / f"{len(counts)}.urdf"
         path.write_text(urdf(name), encoding="utf-8")
-        counts = []
-        for words in (["info"], ["jacobian"], ["dh"], ["dh", "--format", "markdown"], ["dh", "--tree"],
-                      ["acceleration", "--breakdown", "--v", "random"], ["dh", "--format", "c"]):  # fmt: skip
-            done = urdfkin(words[0], str(path), *words[1:])
-            harmless(done, words)
-            counts.append(done.text.count("\n"))
-        lines.append(counts)
-    assert lines[0] == lines[1]
+        shown = [urdfkin(*line.split(), str(path)) for line in lines]
+        for done in shown:
+            harmless(done)
+        counts.append([done.text.count("\n") for done in shown])
+    assert counts[0] == counts[1]
 
 
 @pytest.mark.slow
 def test_machine_formats_say_the_names_as_they_are(files: dict[str, str]) -> None:
     names = [f"{name} " for name in IN_XML.values()]
-    assert set(names) <= {
-        joint["name"] for joint in run(files, ["info", "ROBOT", "--format", "json"]).data["joints"]
-    }
-    rows = run(files, ["dh", "ROBOT", "--format", "json"]).data["rows"]
-    assert [row["joint"] for row in rows] == names
-    import tomllib  # noqa: PLC0415
-
-    table = tomllib.loads(run(files, ["dh", "ROBOT", "--format", "toml"]).text)
-    assert [row["joint"] for row in table["rows"]] == names
+    assert set(names) <= {joint["name"] for joint in run(files, "info ROBOT --format json").data["joints"]}
+    data = run(files, "dh ROBOT --format json").data
+    for table in (data, tomllib.loads(run(files, "dh ROBOT --format toml").text)):
+        assert [row["joint"] for row in table["rows"]] == names
 
 
 def test_a_crash_says_its_last_words_through_the_door() -> None:
@@ -251,16 +216,16 @@ def test_a_crash_says_its_last_words_through_the_door() -> None:
         "import urdfkin.cli as c\nclass Crash:\n  @staticmethod\n"
         f"  def main(**_): raise ValueError({FILE!r})\nc.cli = Crash\nc.main()"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "ValueError" in done.stderr
-    assert acts(done.stderr) == []
+    err = python(code, check=False).stderr
+    assert "ValueError" in err
+    assert acts(err) == []
 
 
 @pytest.mark.slow
 def test_on_a_real_terminal_nothing_but_our_own_colours_comes_out(files: dict[str, str]) -> None:
-    for words in (["check", "ROBOT"], ["info", "ROBOT"], ["dh", "ROBOT"], ["report", "REPORT"]):
-        shown = on_a_terminal([files.get(word, word) for word in words])
-        assert "\x1b[1m" in shown or words[0] in ("dh", "info")
+    for command, file in (("check", "ROBOT"), ("info", "ROBOT"), ("dh", "ROBOT"), ("report", "REPORT")):
+        shown = on_a_terminal([command, files[file]])
+        assert "\x1b[1m" in shown or command in ("dh", "info")
         assert acts(re.sub(r"\x1b\[(0|1|3[1-4]|1;3[1-4])?m", "", shown.replace("\r\n", "\n"))) == []
 
 

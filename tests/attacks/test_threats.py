@@ -1,7 +1,5 @@
 """The page on threats names tests that exist, and says nothing that no test shows."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -9,23 +7,17 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "threats.md").read_text(encoding="utf-8")
 
 
-def test_every_test_and_script_that_the_page_names_exists() -> None:
+def test_every_row_names_a_test_that_exists_and_readers_are_led_there() -> None:
     named = re.findall(r"`(tests/[^`]+\.py)`", PAGE)
     assert len(named) >= 10
     assert [name for name in named if not (ROOT / name).is_file()] == []
     scripts = re.findall(r"`python -m (scripts\.\w+)", PAGE)
     assert scripts
     assert [name for name in scripts if not (ROOT / f"{name.replace('.', '/')}.py").is_file()] == []
-
-
-def test_every_row_names_the_test_that_shows_it() -> None:
     rows = [row.split(" | ") for row in PAGE.splitlines() if row.startswith("| ")][1:]
     for row in rows:
         assert len(row) == 4, row
         assert row[2].strip(), row[0]
         assert "tests/" in row[3], row[0]
-
-
-def test_the_page_on_security_leads_there() -> None:
     assert "(docs/threats.md)" in (ROOT / "SECURITY.md").read_text(encoding="utf-8")
     assert "SECURITY.md" in (ROOT / "README.md").read_text(encoding="utf-8")

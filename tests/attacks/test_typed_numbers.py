@@ -1,14 +1,13 @@
 """A number that a user types or writes is decimal digits in ASCII; what looks like one is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import urdfkin
+from tests.cli.running import refused, urdfkin
+from tests.urdfs import joint, robot
 from urdfkin.robot.trajectory import read_trajectory
 
 #: What Python's float takes, and nobody means.
@@ -21,18 +20,14 @@ MEANT = {"1": 1.0, "+1.5": 1.5, "-.5": -0.5, "1.": 1.0, "1e-3": 1e-3, " 2E+2 ": 
 
 @pytest.mark.parametrize("text", [text for text in NOT_MEANT if "," not in text])
 def test_it_is_refused_in_a_list_on_the_command_line(text: str) -> None:
-    done = urdfkin("placement", "ur5", "--q", f"0,0,{text},0,0,0")
-    assert done.code == 2
-    assert "--q, elbow_joint: not a finite number: found" in done.err
+    assert "--q, elbow_joint: not a finite number: found" in refused("placement ur5 --q", f"0,0,{text},0,0,0")
 
 
 @pytest.mark.parametrize("text", NOT_MEANT)
 def test_it_is_refused_in_a_file_with_its_line_and_column(text: str, tmp_path: Path) -> None:
     path = tmp_path / "q.csv"
     path.write_text(f'0,0,0,0,0,0\n# a remark\n0,0,0,"{text}",0,0\n', encoding="utf-8")
-    done = urdfkin("placement", "ur5", "--q", f"@{path}")
-    assert done.code == 2
-    assert "q.csv:3, wrist_1_joint: not a finite number: found" in done.err
+    assert "q.csv:3, wrist_1_joint: not a finite number: found" in refused("placement ur5 --q", f"@{path}")
 
 
 @pytest.mark.parametrize("text", NOT_MEANT)
@@ -61,20 +56,18 @@ def test_it_is_refused_as_an_option(
     words: tuple[str, ...], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    done = urdfkin(*words, text)
-    assert done.code == 2
-    assert f"Invalid value for '{words[-1]}'" in done.err
+    assert f"Invalid value for '{words[-1]}'" in refused(*words, text)
 
 
 @pytest.mark.parametrize("count", ["1_0", "\u0661", "0", "-1", "1.5", ""])
 def test_it_is_refused_as_a_count_of_samples(count: str) -> None:
-    done = urdfkin("placement", "ur5", "--q", f"random:{count}")
+    done = urdfkin("placement ur5 --q", f"random:{count}")
     assert (done.code == 0) is (count == ""), done.err
 
 
 @pytest.mark.parametrize("text", MEANT)
 def test_what_is_a_number_is_taken(text: str) -> None:
-    done = urdfkin("placement", "ur5", "--no-verify", "--format", "json", "--q", f"0,0,{text},0,0,0")
+    done = urdfkin("placement ur5 --no-verify --format json --q", f"0,0,{text},0,0,0")
     assert done.data["q"] == [[0.0, 0.0, MEANT[text], 0.0, 0.0, 0.0]]
 
 
@@ -83,53 +76,44 @@ def test_what_is_a_number_is_taken(text: str) -> None:
 NAMES = "shoulder_pan_joint,shoulder_lift_joint,elbow_joint,wrist_1_joint,wrist_2_joint,wrist_3_joint"
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (f"{NAMES},more\n0,0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
-        (f"{NAMES},more\n0,0,0,0,0,0,0\n", "found unknown: more;"),
-        (NAMES.replace(",elbow_joint", "") + "\n0,0,0,0,0\n", "found missing: elbow_joint;"),
-        (NAMES.replace("elbow_joint", "wrist_1_joint") + "\n", "missing: elbow_joint; duplicate: wrist_1_"),
-        (
-            f"{NAMES}\n0,0,0,0,0,0,0\n",
-            f"q.csv:2: 6 numbers are expected ({NAMES.replace(',', ', ')}): found 7",
-        ),
-        (f"{NAMES}\n0,0,0,0,0\n", "q.csv:2: 6 numbers are expected"),
-        (f"{NAMES}\n0,0,0,0,0\n", "found 5, none for wrist_3_joint"),
-        (f'# remark\n\n{NAMES}\n"0",0,0,0,0,0\n\n0,0\n', "q.csv:6: 6 numbers are expected"),
-        (f'{NAMES}\n0,0,0,0,0,"0\n', "q.csv:2: not valid CSV"),
-    ],
-)
+#: What is wrong with a file of --q, and what is said.
+FILES = [
+    ("1,2\n", "q.csv:1: 6 numbers are expected"),
+    ("a,b,c,d,e,f\n0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
+    (f"{NAMES},more\n0,0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
+    (f"{NAMES},more\n0,0,0,0,0,0,0\n", "found unknown: more;"),
+    (NAMES.replace(",elbow_joint", "") + "\n0,0,0,0,0\n", "found missing: elbow_joint;"),
+    (NAMES.replace("elbow_joint", "wrist_1_joint") + "\n", "missing: elbow_joint; duplicate: wrist_1_"),
+    (f"{NAMES}\n0,0,0,0,0,0,0\n", f"q.csv:2: 6 numbers are expected ({NAMES.replace(',', ', ')}): found 7"),
+    (f"{NAMES}\n0,0,0,0,0\n", "q.csv:2: 6 numbers are expected"),
+    (f"{NAMES}\n0,0,0,0,0\n", "found 5, none for wrist_3_joint"),
+    (f'# remark\n\n{NAMES}\n"0",0,0,0,0,0\n\n0,0\n', "q.csv:6: 6 numbers are expected"),
+    (f'{NAMES}\n0,0,0,0,0,"0\n', "q.csv:2: not valid CSV"),
+    ("\x00\x00", "q.csv"),
+    ("0;0;0;0;0;0\n", "q.csv:1"),
+]
+
+
+@pytest.mark.parametrize(("content", "message"), FILES)
 def test_a_column_too_many_or_missing_is_told_with_file_line_and_name(
     content: str, message: str, tmp_path: Path
 ) -> None:
     (tmp_path / "q.csv").write_text(content)
-    done = urdfkin("placement", "ur5", "--q", f"@{tmp_path / 'q.csv'}")
-    assert done.code == 2
-    assert message in done.err
+    assert message in refused("placement ur5 --q", f"@{tmp_path / 'q.csv'}")
 
 
 def test_columns_in_any_order_are_read_by_name_and_a_mistake_is_told_by_name(tmp_path: Path) -> None:
     names = NAMES.split(",")[::-1]
     path = tmp_path / "q.csv"
     path.write_text(",".join(names) + "\n6,5,4,3,2,1\n")
-    done = urdfkin("placement", "ur5", "--no-verify", "--format", "json", "--q", f"@{path}")
+    done = urdfkin("placement ur5 --no-verify --format json --q", f"@{path}")
     assert done.data["q"] == [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]
     path.write_text(",".join(names) + "\n6,5,4,3,2,x\n")
-    assert (
-        "q.csv:2, shoulder_pan_joint: not a finite number"
-        in urdfkin("placement", "ur5", "--q", f"@{path}").err
-    )
+    assert "q.csv:2, shoulder_pan_joint: not a finite number" in urdfkin("placement ur5 --q", f"@{path}").err
 
 
 def test_joints_that_are_called_like_numbers_may_head_a_file(tmp_path: Path) -> None:
-    joint = (
-        '<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><axis xyz="0 0 1"/></joint>'
-    )
-    links = "".join(f'<link name="{link}"/>' for link in "abc")
-    (tmp_path / "r.urdf").write_text(
-        f'<robot name="r">{links}{joint.format(1, "a", "b")}{joint.format(2, "b", "c")}</robot>'
-    )
+    text = robot(joint("1", "continuous", "a", "b"), joint("2", "continuous", "b", "c"))
     (tmp_path / "q.csv").write_text("2,1\n0.2,0.1\n")
-    done = urdfkin("placement", str(tmp_path / "r.urdf"), "--format", "json", "--q", f"@{tmp_path / 'q.csv'}")
+    done = urdfkin("placement - --format json --q", f"@{tmp_path / 'q.csv'}", stdin=text)
     np.testing.assert_array_equal(done.data["q"], [[0.1, 0.2]])

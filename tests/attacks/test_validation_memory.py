@@ -1,10 +1,6 @@
 """Memory is asked for before it is taken, bounded, and grows with the robot's size, not with its square."""
 
-from __future__ import annotations
-
 import resource
-import subprocess
-import sys
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +9,8 @@ from typing import Any
 import pytest
 
 import urdfkin
+from tests.cli.running import python
+from tests.urdfs import joint, limit, robot
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import OracleError
@@ -29,23 +27,26 @@ GB = 10**9
 
 def chain(joints: int, kind: str, leaves: int = 0) -> str:
     """A chain of joints, and fixed leaves at its end."""
-    moves = '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
-    parts = ['<robot name="r"><link name="l0"/>']
-    for i in range(joints + leaves):
-        parent, type_ = (i, kind) if i < joints else (joints, "fixed")
-        parts.append(
-            f'<link name="l{i + 1}"/><joint name="j{i}" type="{type_}"><parent link="l{parent}"/>'
-            f'<child link="l{i + 1}"/><origin xyz="0.1 0 0"/>{moves if type_ != "fixed" else ""}</joint>'
-        )
-    return "".join(parts) + "</robot>"
+    inside = "" if kind == "fixed" else limit()
+    parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", 'xyz="0.1 0 0"', more=inside) for i in range(joints)]
+    ends = range(joints, joints + leaves)
+    parts += [joint(f"j{i}", "fixed", f"l{joints}", f"l{i + 1}", 'xyz="0.1 0 0"', "") for i in ends]
+    return robot(*parts) if parts else '<robot name="r"><link name="l0"/></robot>'
 
 
-def test_blocks_cover_everything_once_and_keep_to_their_size(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_cover_everything_once_and_processes_share_what_is_free(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(comparison, "BLOCK_BYTES", 1000)
     for count, size, most in ((10, 300, 3), (9, 300, 3), (1, 300, 1), (5, 2000, 1), (0, 300, 0)):
         found = list(comparison.blocks(count, size))
         assert [i for block in found for i in range(count)[block]] == list(range(count))
         assert max(block.stop - block.start for block in found) == most
+    monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
+    assert memory.share() == 4 * GB
+    assert memory.share(4) == GB
+    monkeypatch.setattr(memory, "_free", lambda: iter([]))
+    assert memory.share() is None
 
 
 @pytest.mark.long
@@ -132,14 +133,6 @@ def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
     assert robot.portrait.model is not None
 
 
-def test_processes_share_what_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
-    assert memory.share() == 4 * GB
-    assert memory.share(4) == GB
-    monkeypatch.setattr(memory, "_free", lambda: iter([]))
-    assert memory.share() is None
-
-
 @pytest.mark.long
 def test_what_a_robot_needs_grows_with_the_cube_of_its_rates_and_with_its_links() -> None:
     trees = [urdfkin.load(chain(n, "revolute")).tree for n in (100, 200)]
@@ -172,8 +165,14 @@ def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, st
     return write
 
 
-def test_the_machines_memory_counts(system: Callable[[str, str], None]) -> None:
+def test_the_machines_memory_counts_and_a_containers_own_topmost_group(
+    system: Callable[[str, str], None],
+) -> None:
     assert memory.share() == 8_000_000 * 1024 // 2
+    system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
+    system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
+    system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
+    assert memory.share() == 1_000_000_000
 
 
 def test_the_control_groups_limits_count_less_what_they_would_give_back(
@@ -190,15 +189,6 @@ def test_the_control_groups_limits_count_less_what_they_would_give_back(
     assert memory.share() == 250_000_000
 
 
-def test_a_container_that_sees_its_own_group_as_the_topmost_counts(
-    system: Callable[[str, str], None],
-) -> None:
-    system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
-    system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
-    system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
-    assert memory.share() == 1_000_000_000
-
-
 @pytest.mark.long
 def test_a_limit_of_the_process_counts() -> None:
     """`ulimit -v`: what does not fit is told, and not found out by a MemoryError."""
@@ -206,7 +196,7 @@ def test_a_limit_of_the_process_counts() -> None:
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 * 10**9,) * 2)\n"
         "from urdfkin.validation import memory; print(memory.share())"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python(code)
     assert 0 < int(done.stdout) < 1.5 * GB
 
 
@@ -224,5 +214,5 @@ def test_many_fixed_links_are_checked_in_little_memory() -> None:
         "assert validate(chain(5000, 'fixed'), samples=1).passed\n"
         "print(peak() - before)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python(code)
     assert int(done.stdout) < 400  # MB; paths of all frames alone took 1 GB

@@ -1,13 +1,12 @@
 """No robot takes a validation with it, whatever it raises; none is passed over in silence."""
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -141,8 +140,6 @@ def test_the_chunks_of_a_robot_that_failed_are_not_run(how: Any, monkeypatch: py
 
 
 def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
-    from dataclasses import replace  # noqa: PLC0415
-
     def failing(chunk: Chunk) -> ChunkResult:
         if chunk.index == 1:
             raise MemoryError
@@ -175,24 +172,23 @@ def test_what_the_machinery_itself_raises_is_every_unfinished_robots_result(
     assert "Traceback" in str(report.robots[2].error)
 
 
-def test_a_run_that_reports_on_fewer_robots_than_it_was_asked_for_has_not_passed() -> None:
+def test_a_run_over_fewer_robots_than_asked_for_or_over_none_has_not_passed() -> None:
     whole = validate(["planar_two_link", "double_pendulum"], samples=0)
     part = ValidationReport(whole.robots[:1], 2, 0, 0, whole.started, 1.0)
     assert whole.passed
     assert (part.passed, part.exit_code) == (False, 3)
     assert part.outcome.reason == "1 of 2 robots without a report"
-
-
-def test_a_run_over_no_robot_has_not_passed() -> None:
     report = validate([])
     assert (report.passed, report.exit_code) == (False, 3)
     assert report.as_dict()["reason"] == "no robot was validated"
 
 
 def test_an_interrupted_run_has_not_passed_even_where_every_robot_is_verified() -> None:
-    found = outcome(["verified", "verified"], asked=2, interrupted=True)
-    assert (found.passed, found.exit_code) == (False, 130)
-    assert outcome(["verified"], asked=1, interrupted=False).exit_code == 0
+    whole = validate(["planar_two_link"], samples=0)
+    ended = replace(whole, interrupted=True)
+    assert (whole.passed, whole.exit_code, whole.as_dict()["verdict"]) == (True, 0, "verified")
+    assert (ended.passed, ended.exit_code, ended.as_dict()["verdict"]) == (False, 130, "interrupted")
+    assert ended.robots[0].verdict == "verified"
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """SIGTERM and SIGHUP end a validation as Ctrl-C does, and workers end with their parent, however it dies."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -14,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.running import python
 from urdfkin.cli.exit import Stop, stoppable
 
 pytestmark = pytest.mark.long
@@ -128,14 +127,16 @@ def test_a_worker_ends_at_the_end_of_its_pipe_alone(tmp_path: Path) -> None:
         "    if time.monotonic() > deadline: os.kill(child, 9); sys.exit('still there')\n"
         "    time.sleep(0.05)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    python(code)
 
 
-def test_a_worker_whose_parent_is_gone_already_does_not_begin() -> None:
+def test_a_worker_whose_parent_is_gone_does_not_begin_and_a_disagreement_stays_one() -> None:
     code = "from urdfkin.validation.worker_processes import _end_with; _end_with(1 << 22); print('began')"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = python(code, check=False)
     assert (done.returncode, done.stdout) == (0, "")
+    assert Stop(signal.SIGTERM).exit_code(130) == 143
+    assert Stop(signal.SIGTERM).exit_code(1) == 1
+    assert Stop().exit_code(3) == 3
 
 
 def test_only_the_first_signal_interrupts_and_the_handlers_are_put_back() -> None:
@@ -159,9 +160,3 @@ def test_only_the_first_signal_interrupts_and_the_handlers_are_put_back() -> Non
     finally:
         for each, handler in zip((signal.SIGTERM, signal.SIGHUP), before, strict=True):
             signal.signal(each, handler)
-
-
-def test_a_disagreement_that_was_found_stays_one() -> None:
-    assert Stop(signal.SIGTERM).exit_code(130) == 143
-    assert Stop(signal.SIGTERM).exit_code(1) == 1
-    assert Stop().exit_code(3) == 3

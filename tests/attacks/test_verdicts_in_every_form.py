@@ -1,7 +1,5 @@
 """Every form of a report tells every verdict with its reason, and how the whole run ended."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable
@@ -13,6 +11,7 @@ from rich.console import Console
 
 from tests.report.documents import arms, failing
 from tests.report.test_junit import read
+from tests.urdfs import chain
 from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
 from urdfkin.report.reading import contradictions
@@ -47,12 +46,7 @@ def _tables_without_numbers(monkeypatch: pytest.MonkeyPatch) -> Document:
 
 
 def _refused(_: pytest.MonkeyPatch) -> Document:
-    huge = "".join(
-        f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
-        f'<child link="l{i + 1}"/><axis xyz="0 0 1"/></joint>'
-        for i in range(320)
-    )
-    return _made(f'<robot name="huge"><link name="l0"/>{huge}</robot>')
+    return _made(chain([""] * 320, origin="", name="huge"))
 
 
 def _broken(_: pytest.MonkeyPatch) -> Document:
@@ -95,33 +89,22 @@ def _made(robots: Any, **how: Any) -> Document:
 CASES: dict[str, tuple[Callable[[pytest.MonkeyPatch], Document], list[str], str, int, tuple[int, int]]] = {
     "results outside": (_outside, ["disagrees"], "3 of 8,000 results lie outside their bound", 1, (2, 0)),
     "tables": (
-        _tables,
-        ["disagrees"],
-        "the Denavit-Hartenberg tables from base_link to tool0 disagree with Pinocchio: 2.5e+07 times the"
-        " bound, tip 0.0021 m off",
-        1,
-        (1, 0),
+        _tables, ["disagrees"], "the Denavit-Hartenberg tables from base_link to tool0 disagree with "
+        "Pinocchio: 2.5e+07 times the bound, tip 0.0021 m off", 1, (1, 0),
     ),
     "tables, no number": (
-        _tables_without_numbers,
-        ["disagrees"],
-        "disagree with Pinocchio: by an infinite amount",
-        1,
-        (1, 0),
+        _tables_without_numbers, ["disagrees"], "disagree with Pinocchio: by an infinite amount", 1, (1, 0),
     ),
     "refused": (_refused, ["not verified"], "memory grows with nv^3", 3, (1, 0)),
     "bad input": (_broken, ["bad input"], "URDF", 2, (0, 1)),
     "crash": (_crashed, ["not verified"], "please report it: MemoryError: no message", 3, (1, 0)),
     "interrupt": (
-        _interrupted,
-        ["verified", "not verified", "not verified"],
-        "interrupted: 0 of 53 samples were compared",
-        130,
-        (2, 1),
+        _interrupted, ["verified", "not verified", "not verified"],
+        "interrupted: 0 of 53 samples were compared", 130, (2, 1),
     ),
     "nothing": (_none, [], "", 3, (0, 1)),
     "missing": (_missing, ["verified", "verified"], "", 3, (0, 1)),
-}
+}  # fmt: skip
 
 
 def terminal(document: Document) -> str:
@@ -201,17 +184,15 @@ def test_junit_tells_a_failure_from_an_error(monkeypatch: pytest.MonkeyPatch) ->
     assert len(checks) == 1
 
 
-def test_the_traceback_of_a_crash_is_in_the_data_and_in_junit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_crash_has_its_traceback_and_a_partly_compared_robot_its_samples_in_the_data(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     document = _crashed(monkeypatch)
     error = document["robots"][0].get("error")
     assert error is not None
     assert error.startswith("Traceback (most recent call last)")
     assert "in crash" in (read(document).findtext(".//failure") or "")
-
-
-def test_a_partly_compared_robot_says_how_many_samples_and_keeps_its_figures(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch.undo()
     robot = _interrupted(monkeypatch)["robots"][1]
     assert (robot["samples"], robot["results"] > 0) == (28, True)
     assert robot["reason"] == "interrupted: 28 of 53 samples were compared"

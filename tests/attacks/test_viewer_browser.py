@@ -1,22 +1,21 @@
 """The viewer in a real browser: other pages try to read, drive, frame and redirect it, names to script it."""
 
-from __future__ import annotations
-
 import socket
 import threading
 import time
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
+import msgspec
 import pytest
+from websockets.sync.client import connect
 
-import urdfkin
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all
 from tests.attacks.test_viewer_gate import free_port, key_of
 from tests.report.browser import Browser, opened
+from tests.urdfs import loaded
 from urdfkin.view.server import new_server
 from urdfkin.view.viewer import Viewer
 
@@ -61,16 +60,10 @@ def other_site() -> Iterator[str]:
     server.server_close()
 
 
-def hostile_robot() -> urdfkin.Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(chain_of_all())
-
-
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
     server = new_server(port=free_port())
-    yield Viewer(server, hostile_robot())
+    yield Viewer(server, loaded(chain_of_all()))
     server.stop()
 
 
@@ -88,16 +81,6 @@ def attack(browser: Browser, address: str) -> tuple[list[str], list[str]]:
     browser.errors()
     found = browser.chrome.execute_async_script(ATTACK, address, f"viser-v{viser.__version__}")
     return found, browser.errors()
-
-
-def wait_for(browser: Browser, words: str) -> str:
-    text = ""
-    for _ in range(60):
-        text = str(browser.js("return document.body.innerText"))
-        if words in text:
-            break
-        time.sleep(0.5)
-    return text
 
 
 def test_another_page_can_neither_connect_nor_read_nor_frame_the_viewer(
@@ -138,9 +121,11 @@ def test_the_page_follows_no_address_to_another_server(viewer: Viewer, browser: 
             elsewhere.accept()
 
 
-def test_no_name_becomes_an_element_or_a_script_in_any_panel(viewer: Viewer, browser: Browser) -> None:
+def test_no_name_becomes_an_element_or_a_script_in_any_panel_and_it_is_shown_as_it_is(
+    viewer: Viewer, browser: Browser
+) -> None:
     browser.chrome.get(viewer.server.address)
-    assert "verified" in wait_for(browser, "verified")
+    browser.wait_for("verified")
     viewer.dh.value = "standard"
     for frame in IN_XML.values():
         viewer.frame.value = frame
@@ -159,31 +144,21 @@ def test_no_name_becomes_an_element_or_a_script_in_any_panel(viewer: Viewer, bro
     viewer.dh.value = "standard"
     viewer._choose()
     assert browser.js("return document.querySelectorAll('#hacked, iframe').length") == 0
-
-
-def test_a_name_is_shown_as_it_is(viewer: Viewer, browser: Browser) -> None:
     viewer.dh.value, viewer.frame.value = "standard", NAMES["script"]
     viewer._choose()
     browser.chrome.get(viewer.server.address)
-    assert f"base to {NAMES['script']}" in wait_for(browser, "base to")
+    browser.wait_for(f"base to {NAMES['script']}")
 
 
 def test_who_knows_the_key_cannot_have_the_viewer_published(
     viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import msgspec  # noqa: PLC0415  with viser
-    from websockets.sync.client import connect  # noqa: PLC0415
-
     asked: list[object] = []
     monkeypatch.setattr("viser._viser.ViserTunnel", lambda *words: asked.append(words))
     host = f"127.0.0.1:{viewer.server.get_port()}"
     origin: Any = f"http://{host}"
     protocol: Any = f"viser-v{viser.__version__}"
-    with connect(
-        f"ws://{host}/{key_of(viewer.server)}",
-        origin=origin,
-        subprotocols=[protocol],
-    ) as client:
+    with connect(f"ws://{host}/{key_of(viewer.server)}", origin=origin, subprotocols=[protocol]) as client:
         for _ in range(3):
             client.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
         client.recv(timeout=20)

@@ -1,7 +1,5 @@
 """The viewer answers its own page with its key, and nobody else: asked over a socket, as a stranger would."""
 
-from __future__ import annotations
-
 import http.client
 import inspect
 import socket
@@ -26,6 +24,10 @@ UPGRADE = {
     "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
     "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==", "Sec-WebSocket-Protocol": f"viser-v{viser.__version__}",
 }  # fmt: skip
+
+
+STRANGE_PATHS = "/", "/KEYx/", "/index.html", "/KEY/index.html", "/../KEY/", "/%2e%2e/", "/key/", "/KEY/x/.."
+STRANGE_ORIGINS = "null", "http://evil.example", "https://OWN", "http://127.0.0.1:1", "http://localhost"
 
 
 def free_port() -> int:
@@ -77,37 +79,18 @@ def test_the_viewer_listens_to_this_machine_alone_unless_told_otherwise(server: 
     ]
 
 
-def test_the_page_is_for_who_holds_the_key(server: Any) -> None:
+def test_the_page_and_a_connection_are_for_who_holds_the_key(server: Any) -> None:
     assert ask(server, "/KEY/").status == 200
     assert ask(server, "/KEY/?darkMode").status == 200
-    for path in (
-        "/",
-        "/KEYx/",
-        "/index.html",
-        "/KEY/index.html",
-        "/../KEY/",
-        "/%2e%2e/",
-        "/key/",
-        "/KEY/x/..",
-    ):
+    for path in STRANGE_PATHS:
         assert ask(server, path).status == 403, path
     assert len(key_of(server)) >= 20
     other = new_server(port=free_port())
     other.stop()
     assert key_of(other) != key_of(server)
-
-
-def test_a_connection_needs_the_key_and_the_viewers_own_page(server: Any) -> None:
     assert connect(server, Origin="http://OWN") == 101
     assert connect(server, "/", Origin="http://OWN") == 403
-    for origin in (
-        None,
-        "null",
-        "http://evil.example",
-        "https://OWN",
-        "http://127.0.0.1:1",
-        "http://localhost",
-    ):
+    for origin in (*STRANGE_ORIGINS, None):
         assert connect(server, Origin=origin) == 403, origin
 
 
@@ -163,26 +146,19 @@ def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: 
         socket.create_connection((LOOPBACK, port), timeout=5)
 
 
-def test_a_page_with_other_scripts_than_known_is_not_served(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_without_the_gate_or_with_other_scripts_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_SCRIPTS", (("<script data-other=", "{nonce}"),))
     with pytest.raises(UnguardedError, match="the page of viser has unexpected scripts"):
         new_server(port=free_port())
-
-
-def test_a_gate_that_lets_anybody_in_is_noticed_before_a_robot_is_shown(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    monkeypatch.undo()
     monkeypatch.setattr(RequestFilter, "refusal", lambda *_, **__: None)
     with pytest.raises(UnguardedError, match="a page without the key was answered with 200"):
         new_server(port=free_port())
 
 
-def test_an_address_of_another_machine_is_an_error_and_no_search_without_end() -> None:
+def test_on_the_whole_network_names_of_others_are_refused_and_an_address_elsewhere_is_an_error() -> None:
     with pytest.raises(InputError, match=r"--host 192\.0\.2\.1: cannot listen on this address"):
         new_server("192.0.2.1")
-
-
-def test_on_the_whole_network_names_of_others_are_still_refused() -> None:
     gate = RequestFilter("0.0.0.0", "key")
     own = socket.gethostname()
     for host in ("192.168.1.7:8080", f"{own}:8080", "localhost:8080"):

@@ -24,30 +24,24 @@ def index(words: str) -> int:
     return found
 
 
-def test_what_follows_the_first_check_runs_although_it_or_validation_failed() -> None:
+def test_steps_run_after_a_failure_and_the_comparison_needs_its_two_files_alone() -> None:
     later = steps()[index("urdfkin check --strict") + 1 :]
     assert len(later) >= 9
     for step in later:
         assert re.search(r"!cancelled\(\)|always\(\)", step["if"]), step
-
-
-def test_the_comparison_needs_nothing_but_the_two_files_it_compares() -> None:
     condition = steps()[index("urdfkin report compare")]["if"]
     assert "hashFiles('main.json')" in condition
     assert "hashFiles('results.json')" in condition
 
 
-def test_the_key_of_the_kernels_names_all_that_they_depend_on() -> None:
+@pytest.mark.slow
+def test_the_key_of_the_kernels_names_all_that_they_depend_on_and_is_one(tmp_path: Path) -> None:
     cache = steps()[index("actions/cache@")]
     assert "steps.kernels.outputs.key" in cache["with"]["key"]
     told = steps()[index("pip freeze")]
     assert told["id"] == "kernels"
     assert "/proc/cpuinfo" in told["run"]
     assert index("pip install") < index("pip freeze") < index("actions/cache@") < index("urdfkin validate")
-
-
-@pytest.mark.slow
-def test_the_command_that_makes_the_key_makes_one(tmp_path: Path) -> None:
     command = steps()[index("pip freeze")]["run"]
     output = tmp_path / "output"
     environ = {**os.environ, "GITHUB_OUTPUT": str(output)}
@@ -55,9 +49,11 @@ def test_the_command_that_makes_the_key_makes_one(tmp_path: Path) -> None:
     assert re.fullmatch(r"key=[0-9a-f]{16}\n", output.read_text())
 
 
-def test_no_page_names_a_tag_that_may_not_exist() -> None:
+def test_no_page_names_a_tag_and_every_workflow_is_held_against_the_schema() -> None:
     for page in ("docs/ci.md", ".pre-commit-hooks.yaml", "README.md"):
         assert not re.search(r"rev: v?\d", (ROOT / page).read_text("utf-8")), page
+    files = {str(path.relative_to(ROOT)) for path in (ROOT / ".github/workflows").iterdir()}
+    assert files <= WRITTEN.keys()
 
 
 #: GitHub's schema, and what is written for it.
@@ -83,11 +79,6 @@ def test_what_github_reads_keeps_to_its_schema(file: str, tmp_path: Path) -> Non
     broken = tmp_path / "broken.yml"
     broken.write_text(re.sub(r"(?m)^( *)(jobs|runs):", r"\1\2x:", (ROOT / file).read_text("utf-8")))
     assert schema_says(WRITTEN[file], broken)[0] == 1
-
-
-def test_every_workflow_is_held_against_the_schema() -> None:
-    files = {str(path.relative_to(ROOT)) for path in (ROOT / ".github/workflows").iterdir()}
-    assert files <= WRITTEN.keys()
 
 
 def test_the_site_is_built_as_make_builds_it_and_published_from_where_that_puts_it() -> None:

@@ -1,8 +1,5 @@
 """A log that wraps its angles is read as the motion that was logged, and what was done to it is said."""
 
-from __future__ import annotations
-
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -10,35 +7,24 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import urdfkin
 from tests.cli import running
+from tests.urdfs import joint, limit, loaded, mimic
+from tests.urdfs import robot as robot_of
 from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.robot.trajectory import Trajectory, read_trajectory
 from urdfkin.view.plot import foot
 
-JOINT = (
-    '<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-    '<origin xyz="1 0 0"/><axis xyz="0 0 1"/>{more}</joint>'
-)
-LIMIT = '<limit lower="-6" upper="6" effort="1" velocity="1"/>'
 T = np.linspace(0.0, 4.0, 81)
 
 
-def robot_of(*joints: str) -> Robot:
-    links = "".join(f'<link name="{link}"/>' for link in "abc"[: len(joints) + 1])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(f'<robot name="r">{links}{"".join(joints)}</robot>')
-
-
-def joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str:
-    return JOINT.format(name=name, kind=kind, parent=parent, child=child, more=more)
+def arm_of(kind: str, more: str = "") -> Robot:
+    return loaded(robot_of(joint("base", kind, "a", "b", 'xyz="1 0 0"', more=more)))
 
 
 def wheel(follower: str = "") -> Robot:
-    return robot_of(joint("wheel", "continuous", "a", "b"), *([follower] if follower else []))
+    return loaded(robot_of(joint("wheel", "continuous", "a", "b", 'xyz="1 0 0"'), follower))
 
 
 def wrapped(angle: NDArray[Any]) -> NDArray[Any]:
@@ -67,14 +53,11 @@ def test_a_wheel_that_turns_steadily_has_a_steady_rate_wherever_its_log_wraps(
     assert "after unwrapping wheel" in motion.rates
 
 
-def test_a_wheel_may_turn_backwards_and_forwards(tmp_path: Path) -> None:
+def test_a_wheel_turns_backwards_and_forwards_and_what_was_not_wrapped_keeps_its_bits(tmp_path: Path) -> None:
     angle = 7.0 * np.sin(T)
     motion = read(wheel(), tmp_path / "w.csv", wrapped(angle))
     np.testing.assert_allclose(motion.q[:, 0], angle, atol=1e-12)
     np.testing.assert_allclose(motion.v[2:-2, 0], 7.0 * np.cos(T)[2:-2], atol=0.01)
-
-
-def test_what_was_not_wrapped_keeps_its_bits_and_nothing_is_said(tmp_path: Path) -> None:
     angle = np.sin(T)
     motion = read(wheel(), tmp_path / "w.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)
@@ -82,13 +65,12 @@ def test_what_was_not_wrapped_keeps_its_bits_and_nothing_is_said(tmp_path: Path)
     assert motion.rates == "by central differences"
 
 
-def test_a_revolute_joint_is_taken_as_written(tmp_path: Path) -> None:
+def test_a_revolute_joint_and_a_fast_wheel_that_was_never_wrapped_are_taken_as_written(
+    tmp_path: Path,
+) -> None:
     angle = np.where(T < 2.0, 3.0, -3.0)
-    motion = read(robot_of(joint("arm", "revolute", "a", "b", LIMIT)), tmp_path / "r.csv", angle)
+    motion = read(arm_of("revolute", limit(-6, 6)), tmp_path / "r.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)
-
-
-def test_a_fast_wheel_that_was_never_wrapped_is_taken_as_written_and_said(tmp_path: Path) -> None:
     angle = 3.5 * np.arange(len(T))
     motion = read(wheel(), tmp_path / "w.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)
@@ -110,7 +92,8 @@ def test_a_step_of_nearly_half_a_turn_is_called_unsure(tmp_path: Path) -> None:
 def test_a_follower_goes_on_with_its_leader_and_is_told_where_that_changes_it(
     kind: str, ratio: float, told: bool, tmp_path: Path
 ) -> None:
-    follower = joint("f", kind, "b", "c", f'<mimic joint="wheel" multiplier="{ratio}"/>{LIMIT}')
+    more = mimic("wheel", ratio) + limit(-6, 6)
+    follower = joint("f", kind, "b", "c", 'xyz="1 0 0"', more=more)
     motion = read(wheel(follower), tmp_path / "w.csv", wrapped(2.0 * T))
     assert any("joint f follows wheel" in note for note in motion.notes) is told
     np.testing.assert_allclose(motion.q[:, 0], 2.0 * T, atol=1e-12)
@@ -121,7 +104,7 @@ def test_a_planar_joint_on_a_circle_drives_straight_ahead_in_its_own_frame(tmp_p
     t = np.linspace(0.0, 4.0, 4001)
     angle = 2.0 * t
     q = np.column_stack([3.0 * np.sin(angle), -3.0 * np.cos(angle), wrapped(angle)])
-    motion = read(robot_of(joint("base", "planar", "a", "b")), tmp_path / "p.csv", q, t)
+    motion = read(arm_of("planar"), tmp_path / "p.csv", q, t)
     np.testing.assert_allclose(motion.v[1:-1], np.tile([6.0, 0.0, 2.0], (len(t) - 2, 1)), atol=1e-4)
     np.testing.assert_allclose(motion.a[3:-3], 0.0, atol=1e-4)
 
@@ -132,7 +115,7 @@ def test_a_quaternion_that_changes_its_sign_is_the_same_orientation(tmp_path: Pa
     quaternion = np.column_stack([np.sin(t)[:, None] * axis, np.cos(t)])
     signs = np.where((np.arange(len(t)) // 7) % 2, -1.0, 1.0)[:, None]
     q = np.column_stack([np.cos(t), np.sin(t), 0.0 * t, signs * quaternion])
-    motion = read(robot_of(joint("base", "floating", "a", "b")), tmp_path / "f.csv", q, t)
+    motion = read(arm_of("floating"), tmp_path / "f.csv", q, t)
     np.testing.assert_allclose(motion.v[2:-2, 3:], np.tile(2.0 * axis, (len(t) - 4, 1)), atol=1e-3)
     np.testing.assert_allclose(motion.a[3:-3, 3:], 0.0, atol=1e-2)
     world = np.column_stack([-np.sin(t), np.cos(t), 0.0 * t])
@@ -156,8 +139,7 @@ def test_plot_tells_on_stderr_that_it_took_wraps_out(tmp_path: Path) -> None:
     read(robot, tmp_path / "w.csv", wrapped(2.0 * T))
     (tmp_path / "w.urdf").write_text(robot.urdf)
     words = ["plot", tmp_path / "w.urdf", "--trajectory", tmp_path / "w.csv", "-o", tmp_path / "w.svg"]
-    done = running.urdfkin(*map(str, words))
-    assert done.code == 0
+    done = running.good(*map(str, words))
     assert "warning: joint wheel: its angle jumps by a whole turn after sample" in done.err
     assert "after unwrapping wheel" in done.text
     assert "not whether v and a" in " ".join((tmp_path / "w.svg").read_text().split())

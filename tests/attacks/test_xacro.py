@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.running import python
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import XacroError, expand
 
+pytestmark = pytest.mark.slow
 NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 SECRET = "hunter2"
 
@@ -42,28 +44,14 @@ def as_eval(program: str) -> str:
 
 # Each got at os.system, in one way or another, when xacro evaluated it.
 PROGRAMS = [
-    "(lambda: ().__class__)()",
-    "(lambda: [c for c in ().__class__.__base__.__subclasses__() if c.__name__ == 'Popen'])()",
-    "[c for c in ''.__class__.__mro__]",
-    "(x for x in [1]).gi_frame.f_back",
-    "[(yield)]",
-    "load_yaml.__globals__['os']",
-    "xacro.load_yaml.__globals__['os'].system('touch ' + mark)",
-    "'{0.__globals__}'.format(load_yaml)",
-    "str.format('{0.__globals__}', load_yaml)",
-    "python.vars(python)",
-    "python.map(python.vars, [python])",
-    "python.type('x', (), dict(__init__=len))",
-    "list(map(python.type, ['x']))",
-    "list.mro()",
-    "dict['a']",
-    "math.__loader__",
-    "(a := 1)",
-    "f'{load_yaml.__globals__}'",
-    "__import__('os')",
-    "__builtins__",
-    "(len if 1 else 2).__self__",
-]
+    "(lambda: ().__class__)()", "[c for c in ''.__class__.__mro__]", "(x for x in [1]).gi_frame.f_back",
+    "(lambda: [c for c in ().__class__.__base__.__subclasses__() if c.__name__ == 'Popen'])()", "[(yield)]",
+    "load_yaml.__globals__['os']", "xacro.load_yaml.__globals__['os'].system('touch ' + mark)",
+    "'{0.__globals__}'.format(load_yaml)", "str.format('{0.__globals__}', load_yaml)", "list.mro()",
+    "python.vars(python)", "python.map(python.vars, [python])", "python.type('x', (), dict(__init__=len))",
+    "list(map(python.type, ['x']))", "dict['a']", "math.__loader__", "(a := 1)", "__import__('os')",
+    "f'{load_yaml.__globals__}'", "__builtins__", "(len if 1 else 2).__self__",
+]  # fmt: skip
 
 
 REFUSALS = (
@@ -72,7 +60,6 @@ REFUSALS = (
 )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_an_expression_that_is_a_program_is_refused_by_name(expanded: Expand, program: str) -> None:
     ways = [as_eval(program)]
@@ -85,7 +72,6 @@ def test_an_expression_that_is_a_program_is_refused_by_name(expanded: Expand, pr
             expanded(inside)
 
 
-@pytest.mark.slow
 def test_eval_has_no_builtins(expanded: Expand, tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     for program in (f"open('{mark}', 'w')", f"map(open, ['{mark}'], ['w'])", "open('/etc/passwd').read()"):
@@ -95,34 +81,20 @@ def test_eval_has_no_builtins(expanded: Expand, tmp_path: Path) -> None:
     assert 'name="3"' in expanded(as_eval("1 + 2"))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("expression", "value"),
-    [
-        ("pi/2", "1.5707963267948966"),
-        ("radians(90)", "1.5707963267948966"),
-        ("math.sqrt(2)**2", "2.0000000000000004"),
-        ("-2 + 7 // 2 % 3", "-2"),
-        ("d['a'] + d.b[1]", "4"),
-        ("prefix + 'arm' + str(1)", "left_arm1"),
-        ("prefix[-5:-1]", "left"),
-        ("'x'.join([str(i * j) for i, j in [(1, 2), (3, 4)] if i])", "2x12"),
-        ("' '.join(map(str, [1, 2]))", "1 2"),
-        ("len(python.list(python.range(3)))", "3"),
-        ("'%0.2f' % pi", "3.14"),
-        ("max(*[1, 2]) if 1 < 2 <= 2 and not None else 0", "2"),
-        ("'1:2'.split(':').pop(0).strip().zfill(2)", "01"),
-        ("python.isinstance(prefix, str) and 'left' in prefix", "True"),
-        ("xacro.dotify(dict(a=dict(b=5))).a.b", "5"),
-        ("xacro.arg('size')", "2"),
-        ("1 << 2", None),
-        ("y.limits.upper", "1.5"),
-        ("y.tilt", "3.141592653589793"),
-    ],
-)
-def test_what_robots_compute_is_computed(
-    expanded: Expand, expression: str, value: str | None, tmp_path: Path
-) -> None:
+COMPUTED = {
+    "pi/2": "1.5707963267948966", "radians(90)": "1.5707963267948966", "-2 + 7 // 2 % 3": "-2",
+    "math.sqrt(2)**2": "2.0000000000000004", "d['a'] + d.b[1]": "4", "prefix[-5:-1]": "left",
+    "prefix + 'arm' + str(1)": "left_arm1", "' '.join(map(str, [1, 2]))": "1 2", "'%0.2f' % pi": "3.14",
+    "'x'.join([str(i * j) for i, j in [(1, 2), (3, 4)] if i])": "2x12", "xacro.arg('size')": "2",
+    "len(python.list(python.range(3)))": "3", "max(*[1, 2]) if 1 < 2 <= 2 and not None else 0": "2",
+    "'1:2'.split(':').pop(0).strip().zfill(2)": "01", "y.limits.upper": "1.5", "1 << 2": None,
+    "python.isinstance(prefix, str) and 'left' in prefix": "True", "y.tilt": "3.141592653589793",
+    "xacro.dotify(dict(a=dict(b=5))).a.b": "5",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("expression", COMPUTED)
+def test_what_robots_compute_is_computed(expanded: Expand, expression: str, tmp_path: Path) -> None:
     folder = tmp_path / "robot" / "config"
     folder.mkdir(parents=True)
     (folder / "y.yaml").write_text("limits: {upper: 1.5}\ntilt: !degrees 180\n")
@@ -133,7 +105,7 @@ def test_what_robots_compute_is_computed(
     )
     (tmp_path / "robot" / "package.xml").write_text("<package><name>robot</name></package>")
     written = before + link(f"${{{expression}}}".replace("<", "&lt;"))
-    if value is None:
+    if (value := COMPUTED[expression]) is None:
         with pytest.raises(XacroError, match="operator in"):
             expanded(written)
     else:
@@ -160,7 +132,6 @@ def refused(expanded: Expand, inside: str) -> str:
     return str(caught.value)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     ["../../neighbour/secret", "{tmp}/neighbour/secret", "../urdf/../../neighbour/secret", "link/secret"],
@@ -175,10 +146,12 @@ def test_files_of_others_are_not_read(expanded: Expand, secret: Path, tmp_path: 
         refused(expanded, f"<xacro:include {how.format(name)}/>")
 
 
-@pytest.mark.slow
-def test_a_folder_becomes_a_package_only_by_its_manifest_or_a_search_path(
+def test_a_file_is_read_that_the_user_names_or_a_package_or_search_path_holds(
     expanded: Expand, secret: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
+    assert SECRET in expanded(inside, file=str(secret))
+    refused(expanded, inside.replace('default=""', f'default="{secret}"'))
     inside = '<xacro:include filename="$(find neighbour)/secret.xacro"/>'
     assert "package 'neighbour' is not found" in refused(expanded, inside)
     refused(expanded, '<xacro:include filename="$(find etc)/passwd"/>')
@@ -189,14 +162,6 @@ def test_a_folder_becomes_a_package_only_by_its_manifest_or_a_search_path(
     assert SECRET in expanded(inside)
 
 
-@pytest.mark.slow
-def test_a_file_that_the_user_names_is_read(expanded: Expand, secret: Path) -> None:
-    inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
-    assert SECRET in expanded(inside, file=str(secret))
-    refused(expanded, inside.replace('default=""', f'default="{secret}"'))
-
-
-@pytest.mark.slow
 def test_hidden_files_and_entities_are_not_read(expanded: Expand, tmp_path: Path, secret: Path) -> None:
     hidden = tmp_path / "robot" / "urdf" / ".git" / "config"
     hidden.parent.mkdir(parents=True)
@@ -247,7 +212,6 @@ def test_links_in_an_installed_package_lead_to_its_sources_and_to_nothing_else(t
         assert not ground.holds(str(installed / other)), other
 
 
-@pytest.mark.slow
 def test_a_repository_on_a_search_path_is_trusted_with_no_links(
     expanded: Expand, secret: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -261,7 +225,6 @@ def test_a_repository_on_a_search_path_is_trusted_with_no_links(
 # -- the environment, programs, the net ---------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_the_environment_is_empty(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TOKEN", SECRET)
     assert "'TOKEN' is not set" in refused(expanded, link("$(env TOKEN)"))
@@ -279,43 +242,25 @@ confine(lambda path: path == "/etc/hostname")
 """
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "deed",
-    [
-        "os.system('true')",
-        "subprocess.run(['true'])",
-        "os.fork()",
-        "os.execv('/bin/true', ['true'])",
-        "os.posix_spawn('/bin/true', ['true'], {})",
-        "socket.socket()",
-        "socket.create_connection(('127.0.0.1', PORT))",
-        "ctypes.CDLL(None)",
-        "ctypes.string_at(id(1), 1)",
-        "import antigravity",
-        "open('/etc/passwd')",
-        "open(0)",
-        "open('/etc/hostname', 'a')",
-        "os.open('/etc/hostname', os.O_RDWR)",
-        "os.remove('/etc/hostname')",
-        "os.rename('/etc/hostname', '/tmp/x')",
-        "os.mkdir('/tmp/x')",
-        "os.listdir('/')",
-        "os.kill(1, 0)",
-        "os.symlink('/etc/passwd', '/tmp/x')",
-        "eval('1')",
-    ],
-)
+DEEDS = [
+    "os.system('true')", "subprocess.run(['true'])", "os.fork()", "os.execv('/bin/true', ['true'])",
+    "os.posix_spawn('/bin/true', ['true'], {})", "socket.socket()", "import antigravity", "eval('1')",
+    "socket.create_connection(('127.0.0.1', PORT))", "ctypes.CDLL(None)", "ctypes.string_at(id(1), 1)",
+    "open('/etc/passwd')", "open(0)", "open('/etc/hostname', 'a')", "os.open('/etc/hostname', os.O_RDWR)",
+    "os.remove('/etc/hostname')", "os.rename('/etc/hostname', '/tmp/x')", "os.mkdir('/tmp/x')",
+    "os.listdir('/')", "os.kill(1, 0)", "os.symlink('/etc/passwd', '/tmp/x')",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("deed", DEEDS)
 def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
-    import subprocess  # noqa: PLC0415
-    import sys  # noqa: PLC0415
 
     with socket.create_server(("127.0.0.1", 0)) as server:
         connected: list[object] = []
         thread = threading.Thread(target=lambda: connected.append(server.accept()), daemon=True)
         thread.start()
         code = WORST.format(deed.replace("PORT", str(server.getsockname()[1])))
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+        done = python(code, check=False)
     assert "RefusedError: " in done.stderr.splitlines()[-1]
     assert not connected
 
@@ -323,7 +268,6 @@ def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
 # -- what it takes ------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "inside",
     [
@@ -338,16 +282,11 @@ def test_memory_has_an_end(expanded: Expand, inside: str) -> None:
         expanded(inside)
 
 
-@pytest.mark.slow
-def test_time_has_an_end(expanded: Expand) -> None:
+def test_time_and_what_it_writes_have_an_end(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(XacroError, match="did not finish: found 2 s"):
         expanded(link("${max(python.range(10**12))}"), patience=2.0)
     with pytest.raises(XacroError, match="recursion"):
         expanded('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>')
-
-
-@pytest.mark.slow
-def test_what_it_writes_has_an_end(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("urdfkin.urdf.xacro.MOST", 10_000)
     with pytest.raises(XacroError, match="URDF is too long: found more than 10000 bytes"):
         expanded(link("${'x' * 20000}"))
@@ -356,22 +295,12 @@ def test_what_it_writes_has_an_end(expanded: Expand, monkeypatch: pytest.MonkeyP
 # -- the walk itself ----------------------------------------------------------------------------------
 
 
-def test_a_function_is_called_only_if_it_was_offered() -> None:
+def test_a_function_is_called_only_if_it_was_offered_and_and_stops_where_python_stops() -> None:
     names = {"f": len, "g": max, "d": {"h": print}, "x": [1, 2]}
     assert evaluate("g(x)", names, [max]) == 2
-    for expression in (
-        "f(x)",
-        "d.h(x)",
-        "d['h'](x)",
-        "(lambda: 1)()",
-        "g(x)(x)",
-        "x.__len__()",
-        "f.__self__",
-    ):
+    others = "f(x)", "d.h(x)", "d['h'](x)", "(lambda: 1)()", "g(x)(x)", "x.__len__()", "f.__self__"
+    for expression in others:
         with pytest.raises(RefusedError):
             evaluate(expression, names, [max])
-
-
-def test_and_and_or_stop_where_python_stops() -> None:
     for expression in ("0 and 1 / 0", "2 or 1 / 0", "1 and 0 or 5", "1 < 0 < 1 / 0", "[] or ''", "3 and 4"):
         assert evaluate(expression, {}, []) == eval(expression)

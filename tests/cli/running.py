@@ -1,10 +1,9 @@
 """Run the `urdfkin` command: in this process where its entry point will do, in one of its own where not."""
 
-from __future__ import annotations
-
 import io
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Collection, Iterator, Sequence
@@ -41,7 +40,11 @@ def _refused(word: str) -> None:
 
 
 def urdfkin(*words: str, stdin: str | bytes = b"") -> Done:
-    """The entry point of the installed command, called here: no new process, the same code."""
+    """The entry point of the installed command, called here: no new process, the same code.
+
+    The first of the words may be a line as one types it: `urdfkin("info ur5 --format", form)`.
+    """
+    words = (*shlex.split(words[0]), *words[1:]) if words and " " in words[0] else words
     data = stdin.encode() if isinstance(stdin, str) else stdin
     out, err = io.BytesIO(), io.StringIO()
     code = 0
@@ -51,6 +54,29 @@ def urdfkin(*words: str, stdin: str | bytes = b"") -> Done:
         except SystemExit as leave:
             code = leave.code if isinstance(leave.code, int) else int(leave.code is not None)
     return Done(code, out.getvalue(), err.getvalue())
+
+
+def good(*words: str, stdin: str | bytes = b"") -> Done:
+    """The same, of a command that ends with exit code 0."""
+    done = urdfkin(*words, stdin=stdin)
+    assert done.code == 0, done.err or done.text
+    return done
+
+
+def refused(*words: str, stdin: str | bytes = b"") -> str:
+    """The message of a command that is a mistake: exit code 2, nothing on standard output, no traceback."""
+    done = urdfkin(*words, stdin=stdin)
+    assert (done.code, done.out) == (2, b""), done.err or done.text
+    assert "Traceback" not in done.err
+    return done.err
+
+
+def python(code: str, *words: str, check: bool = True, **how: Any) -> subprocess.CompletedProcess[str]:
+    """A program in a process of its own, which succeeds unless `check` is false."""
+    command = [sys.executable, "-c", code, *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, **how)
+    assert done.returncode == 0 or not check, done.stderr
+    return done
 
 
 @contextmanager

@@ -1,7 +1,5 @@
 """`urdfkin chain`: axes and origins as Pinocchio's frames have them, up the tree and down."""
 
-from __future__ import annotations
-
 import csv
 import io
 
@@ -9,7 +7,7 @@ import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import urdfkin
+from tests.cli.running import good, refused, urdfkin
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
@@ -23,8 +21,7 @@ PATHS = [
 def test_axes_and_origins_are_those_of_the_robots_own_frames(name: str, base: str, tip: str) -> None:
     robot = library.load(name)
     ends = ["--base", base, "--tip", tip] if base else []
-    done = urdfkin("chain", name, *ends, "--q", "random", "--seed", "3", "--format", "json")
-    assert done.code == 0, done.err
+    done = good("chain", name, *ends, "--q", "random", "--seed", "3", "--format", "json")
     data = done.data
     q = np.array(data["q"])
     here = np.linalg.inv(robot.placement(q, data["base"]))
@@ -70,21 +67,14 @@ def test_a_chain_that_is_elsewhere_is_a_disagreement(slip: str, monkeypatch: pyt
         return poses
 
     monkeypatch.setattr(FrameChain, "frames", wrong)
-    done = urdfkin("chain", "ur5", "--q", "random")
+    done = urdfkin("chain ur5 --q random")
     assert (done.code, done.out) == (1, b"")
     assert "the chain's axes disagree" in done.err
 
 
-def test_without_a_check_it_says_so_and_a_batch_is_refused() -> None:
-    done = urdfkin("chain", "ur5", "--no-verify")
+def test_without_a_check_it_says_so_and_a_batch_or_a_floating_joint_is_refused() -> None:
+    done = urdfkin("chain ur5 --no-verify")
     assert done.code == 3
     assert "NOT VERIFIED" in done.text
-    done = urdfkin("chain", "ur5", "--q", "random:2")
-    assert done.code == 2
-    assert "the chain needs exactly one configuration" in done.err
-
-
-def test_a_floating_joint_on_the_way_is_told() -> None:
-    done = urdfkin("chain", "a1", "--root-joint", "floating", "--base", "universe")
-    assert done.code == 2
-    assert "a floating joint has no single axis" in done.err
+    assert "the chain needs exactly one configuration" in refused("chain ur5 --q random:2")
+    assert "a floating joint has no single axis" in refused("chain a1 --root-joint floating --base universe")

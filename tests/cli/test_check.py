@@ -1,13 +1,13 @@
 """`urdfkin check` through its real entry point: exit codes, formats, options."""
 
-import json
-import subprocess
-import sys
+import os
+import re
 from pathlib import Path
+from urllib.parse import unquote_to_bytes, urlsplit
 
 import pytest
 
-from tests.cli.running import urdfkin
+from tests.cli.running import good, python, refused, urdfkin
 
 GOOD = '<robot name="r">\n  <link name="a"/>\n</robot>\n'
 WARNED = '<robot name="">\n  <link name="a"/>\n</robot>\n'
@@ -21,72 +21,52 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (tmp_path / f"{name}.urdf").write_text(text)
 
 
-def test_a_clean_file_exits_0(folder: None) -> None:
-    done = urdfkin("check", "good.urdf")
-    assert (done.code, done.text, done.err) == (0, "no findings in 1 file\n", "")
+#: A line, its exit code, and how its output begins or, after a star, what is in it.
+LINES = {
+    "good.urdf": (0, "no findings in 1 file\n"),
+    "warned.urdf": (0, "*URDF405"),
+    "--strict warned.urdf": (1, "*URDF405 error"),
+    "--ignore URDF402 bad.urdf": (0, "no findings in 1 file\n"),
+    "-": (1, "<stdin>:"),
+    "--format json bad.urdf good.urdf": (1, "*URDF402"),
+    "--format sarif bad.urdf good.urdf": (1, "*URDF402"),
+    "--format github good.urdf": (0, ""),
+    "--max-bytes 10 good.urdf": (1, "*URDF108"),
+}
 
 
-def test_an_error_exits_1_with_its_place_and_where_to_read_on(folder: None) -> None:
-    done = urdfkin("check", "good.urdf", "bad.urdf")
+@pytest.mark.parametrize("line", LINES)
+def test_the_exit_code_is_1_for_errors_only_and_strict_makes_errors_of_warnings(
+    line: str, folder: None
+) -> None:
+    code, words = LINES[line]
+    done = urdfkin("check", *line.split(), stdin=BAD)
+    assert (done.code, done.err) == (code, "")
+    assert words[1:] in done.text if words.startswith("*") else done.text.startswith(words)
+    if "json" in line or "sarif" in line:
+        assert done.data, "one document"
+
+
+def test_an_error_exits_1_with_its_place_a_missing_file_or_an_unknown_code_2(folder: None) -> None:
+    done = urdfkin("check good.urdf bad.urdf")
     assert done.code == 1
     lines = done.text.splitlines()
     assert lines[0].startswith("bad.urdf:3:9: URDF402 error: link 'a': another link has this name")
     assert lines[1:3] == ['  3 |   <link name="a"/>', "    |         ^^^^^^^^"]
     assert lines[3] == "1 error in 2 files"
     assert lines[4].startswith("run 'urdfkin explain URDF402'")
-
-
-def test_a_warning_exits_0_and_1_when_strict(folder: None) -> None:
-    assert urdfkin("check", "warned.urdf").code == 0
-    done = urdfkin("check", "--strict", "warned.urdf")
-    assert (done.code, "URDF405 error" in done.text) == (1, True)
-
-
-def test_an_ignored_code_does_not_count(folder: None) -> None:
-    done = urdfkin("check", "--ignore", "URDF402", "bad.urdf")
-    assert (done.code, done.text) == (0, "no findings in 1 file\n")
-
-
-def test_a_missing_file_exits_2_and_the_others_are_checked(folder: None) -> None:
-    done = urdfkin("check", "nowhere.urdf", "bad.urdf")
+    done = urdfkin("check nowhere.urdf bad.urdf")
     assert done.code == 2
     assert "URDF402" in done.text
     assert done.err == "urdfkin: error: nowhere.urdf: no such file; did you mean warned.urdf?\n"
-
-
-def test_an_unknown_code_exits_2_with_the_nearest(folder: None) -> None:
-    done = urdfkin("check", "--ignore", "URDF4022", "bad.urdf")
-    assert done.code == 2
-    assert "did you mean URDF402" in done.err
-
-
-def test_standard_input_is_a_file_like_any_other() -> None:
-    done = urdfkin("check", "-", stdin=BAD)
-    assert (done.code, done.text.split(":")[0]) == (1, "<stdin>")
-
-
-@pytest.mark.parametrize("style", ["json", "sarif"])
-def test_the_machine_formats_are_one_document(folder: None, style: str) -> None:
-    done = urdfkin("check", "--format", style, "bad.urdf", "good.urdf")
-    assert done.code == 1
-    assert "URDF402" in json.dumps(done.data)
-
-
-def test_github_prints_nothing_for_a_clean_file(folder: None) -> None:
-    assert urdfkin("check", "--format", "github", "good.urdf").text == ""
-
-
-def test_limits_can_be_lowered(folder: None) -> None:
-    done = urdfkin("check", "--max-bytes", "10", "good.urdf")
-    assert (done.code, "URDF108" in done.text) == (1, True)
+    assert "did you mean URDF402" in refused("check --ignore URDF4022 bad.urdf")
 
 
 def test_explain_prints_a_page_and_lists_all_codes() -> None:
-    page = urdfkin("explain", "urdf502")
-    assert page.code == 0
+    page = good("explain urdf502")
     assert page.text.startswith("URDF502 axis-without-direction (error)")
     assert urdfkin("explain").text.count("\n") > 60
-    assert urdfkin("explain", "URDF999").code == 2
+    assert urdfkin("explain URDF999").code == 2
 
 
 def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> None:
@@ -94,5 +74,31 @@ def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> Non
         "import sys; from urdfkin.urdf.lint import check; check('<robot/>');"
         "print({'numba', 'yourdfpy', 'pinocchio', 'lxml', 'trimesh'} & set(sys.modules))"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = python(program)
     assert done.stdout == "set()\n"
+
+
+NAMES = [b"r\xff\xe9.urdf", b"a b:c%41?#\\[].urdf", "ä\u202e.urdf".encode(), b"a\nb.urdf"]
+
+#: What RFC 3986 lets a path hold.
+PATH = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/-]|%[0-9A-F]{2})+")
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("absolute", [False, True])
+def test_a_file_of_any_name_is_named_by_a_uri_that_gives_its_bytes_back(
+    tmp_path: Path, name: bytes, absolute: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / os.fsdecode(name)
+    place.write_bytes(b"<robot name='r'><link name='a'/><link name='a'/></robot>")
+    given = os.fsencode(place) if absolute else name
+    monkeypatch.chdir(tmp_path)
+    done = urdfkin("check --format sarif", os.fsdecode(given))
+    assert done.code == 1, done.err
+    (result,) = done.data["runs"][0]["results"]
+    uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+    parts = urlsplit(uri)
+    assert PATH.fullmatch(parts.path)
+    assert (parts.scheme, parts.netloc) == ("file" if absolute else "", "")
+    assert (parts.query, parts.fragment) == ("", "")
+    assert unquote_to_bytes(parts.path) == given

@@ -1,7 +1,5 @@
 """What a shell offers as one types, asked as its script asks, and in the shells themselves."""
 
-from __future__ import annotations
-
 import json
 import os
 import pty
@@ -45,11 +43,18 @@ def offered(monkeypatch: pytest.MonkeyPatch) -> Offered:
     return ask
 
 
-def test_commands_options_and_choices_are_offered(offered: Offered) -> None:
+def test_commands_options_choices_codes_equations_and_tables_are_offered(offered: Offered) -> None:
     assert offered("") == list(commands())
     assert offered("jaco") == ["jacobian", "jacobian-rate"]
     assert offered("jacobian panda --refe") == ["--reference"]
     assert offered("jacobian panda --reference lo") == ["local", "local_world_aligned"]
+    slugs = {rule.slug for rule in RULES.values()}
+    assert set(offered("explain ")) == {*RULES, *slugs, *equations()}
+    assert offered("explain 7.13") == ["7.13", "7.130"]
+    assert set(offered("check --ignore ")) == {*RULES, *slugs}
+    assert set(offered("dh ur5 --compare ")) == {"file", *references()}
+    assert offered("check ") == ["file"]
+    assert offered("nonsense x") == []
 
 
 @pytest.mark.parametrize("line", ["info ", "validate ur5 ", "diff ur5 ", "same ur5 ", "export ", "dh "])
@@ -80,50 +85,23 @@ def test_frames_of_an_mjcf_file_are_its_bodies_sites_and_joints(offered: Offered
     assert offered(f"jacobian {path} --frame ") == ["upper", "hinge", "lower", "grip"]
 
 
-def test_codes_equations_and_tables_are_offered(offered: Offered) -> None:
-    slugs = {rule.slug for rule in RULES.values()}
-    assert set(offered("explain ")) == {*RULES, *slugs, *equations()}
-    assert offered("explain 7.13") == ["7.13", "7.130"]
-    assert set(offered("check --ignore ")) == {*RULES, *slugs}
-    assert set(offered("dh ur5 --compare ")) == {"file", *references()}
-    assert offered("check ") == ["file"]
-
-
 def test_no_name_is_offered_that_a_shell_would_carry_out(offered: Offered, tmp_path: Path) -> None:
     """What is completed stands on the command line, and the next key may be the return."""
     path = tmp_path / "hostile.urdf"
-    harmful = (
-        *IN_XML.values(),
-        "$(reboot)",
-        "`reboot`",
-        "a;reboot",
-        "a b",
-        "-o",
-        "a'b",
-        "*",
-        "~x",
-        "a\\b",
-        "!x",
-    )
+    harmful = [
+        *IN_XML.values(), "$(reboot)", "`reboot`", "a;reboot", "a b", "-o", "a'b", "*", "~x", "a\\b", "!x",
+    ]  # fmt: skip
     path.write_text(chain_of_all([*dict.fromkeys(harmful), "fine.name-1"]), encoding="utf-8")
     assert set(offered(f"jacobian {path} --frame ")) == {"base", "fine.name-1", "__proto__"}
 
 
-@pytest.mark.parametrize(
-    "robot",
-    [
-        "nowhere.urdf",
-        "BROKEN",
-        "PIPE",
-        "FOLDER",
-        "-",
-        "arm.xacro",
-        "'",
-        "<robot/>",
-        "/dev/zero",
-        "no such name",
-    ],
-)
+UNREADABLE = [
+    "nowhere.urdf", "BROKEN", "PIPE", "FOLDER", "-", "arm.xacro", "'", "<robot/>", "/dev/zero",
+    "no such name",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("robot", UNREADABLE)
 def test_what_cannot_be_read_offers_nothing_and_says_nothing(
     offered: Offered, robot: str, tmp_path: Path
 ) -> None:
@@ -134,10 +112,6 @@ def test_what_cannot_be_read_offers_nothing_and_says_nothing(
     begin = time.monotonic()
     assert offered(f"jacobian {made.get(robot, robot)} --frame ") in ([], ["file", *catalogue()])
     assert time.monotonic() - begin < 5.0  # a pipe is not waited for
-
-
-def test_an_unknown_command_offers_no_robots_and_says_nothing(offered: Offered) -> None:
-    assert offered("nonsense x") == []
 
 
 def test_completing_imports_nothing_heavy() -> None:
@@ -160,10 +134,7 @@ _PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 #: How each is started without a person's own settings, and told to complete.
 SHELLS = {
     "bash": (["bash", "--norc", "--noprofile", "-i"], 'eval "$(urdfkin completion bash)"'),
-    "zsh": (
-        ["zsh", "-f", "-i"],
-        'autoload -Uz compinit; compinit -u -D; eval "$(urdfkin completion zsh)"',
-    ),
+    "zsh": (["zsh", "-f", "-i"], 'autoload -Uz compinit; compinit -u -D; eval "$(urdfkin completion zsh)"'),
     "fish": (["fish", "--no-config", "-i"], "urdfkin completion fish | source"),
 }
 

@@ -1,16 +1,16 @@
-"""`--convention NAME`: q, v, a and the results of commands in the numbers of a tool."""
+"""`--convention NAME` and `urdfkin order`: the numbers of other tools, and the code that converts them."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
+import itertools
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good, python, refused
 from tests.cli.running import urdfkin as run
+from urdfkin.model.conventions import BUILT_IN
 from urdfkin.verify.quantities import by_command
 
 OF_FRAMES = [name for name, row in by_command().items() if row.referred]
@@ -30,8 +30,7 @@ def test_a_result_is_that_of_the_robot_in_the_convention(command: str, name: str
     ours = robot.sample(1, 3)[0], rng.standard_normal(robot.nv), rng.standard_normal(robot.nv)
     values = dict(zip("qva", other.conversion.to(*ours), strict=True))
     given = [word for letter in row.inputs for word in (f"--{letter}={_text(values[letter])}",)]
-    done = run(command, *DOG, name, *given, "--format", "json")
-    assert done.code == 0, done.err
+    done = good(command, *DOG, name, *given, "--format", "json")
     expected = getattr(other, row.method)(*(values[letter] for letter in row.inputs), "FL_foot")
     assert np.allclose(done.data["result"][0], expected, 0, 1e-12)
     assert np.allclose(done.data["q"][0], values["q"], 0, 1e-15)
@@ -40,45 +39,51 @@ def test_a_result_is_that_of_the_robot_in_the_convention(command: str, name: str
     assert done.data["rows"][0] == ("wx" if name == "drake" else "vx")
 
 
-def test_a_placement_reads_q_of_the_convention_and_says_so() -> None:
+def test_a_placement_reads_q_of_the_convention_and_wxyz_has_its_scalar_first() -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     q = robot.sample(1, 3)[0]
     text = _text(robot.convention("mujoco").to(q))
     done = run("placement", *DOG, "mujoco", "--q", text, "--format", "json")
     assert np.allclose(done.data["result"][0], robot.placement(q, "FL_foot"), 0, 1e-14)
     assert "convention mujoco" in run("placement", *DOG, "mujoco", "--q", text).text
+    x, w = (
+        run("placement ur5 --q random --as", form, "--format", "json").data["result"][0]
+        for form in ("quaternion", "wxyz")
+    )
+    assert w == [*x[:3], x[6], *x[3:6]]
 
 
-def test_the_table_names_the_angular_part_first_where_the_tool_does() -> None:
-    lines = run("velocity", "ur5", "--convention", "drake", "--v", "random").text.splitlines()
+def test_the_table_names_the_convention_and_what_was_checked() -> None:
+    lines = run("velocity ur5 --convention drake --v random").text.splitlines()
     assert "convention drake" in lines[0]
     named = [line.split()[0] for line in lines if line.startswith(("linear", "angular"))]
     assert named == ["angular", "linear"]
-
-
-def test_the_check_is_that_of_the_numbers_before_the_conversion() -> None:
-    done = run("velocity", "ur5", "--convention", "drake", "--v", "random")
+    done = run("velocity ur5 --convention drake --v random")
     assert "before the conversion to drake" in done.err + done.text
-    assert "before the conversion" not in run("velocity", "ur5", "--v", "random").err
+    assert "before the conversion" not in run("velocity ur5 --v random").err
 
 
-def test_a_users_file_and_names_are_read(tmp_path: Path) -> None:
+def test_a_users_file_and_its_units_zeros_and_names_are_read(tmp_path: Path) -> None:
     file = tmp_path / "motors.toml"
     file.write_text('joints = ["elbow", "joint_1"]\nangle = "deg"\n[joint.joint_2]\nname = "elbow"\n')
     for q in ("90,0", "elbow=90, joint_1=0"):
-        done = run("placement", "planar_two_link", "--convention", str(file), "--q", q, "--format", "json")
+        done = run("placement planar_two_link --convention", str(file), "--q", q, "--format", "json")
         assert np.allclose(np.array(done.data["result"])[0, :3, 3], [0.5, 0.4, 0.0])
+    file = tmp_path / "motors.toml"
+    file.write_text('joints = ["joint_2", "joint_1"]\nangle = "deg"\n[joint.joint_1]\nsign = -1\nzero = 5\n')
+    space: dict[str, Any] = {"q_from": np.array([1.0, 2.0]), "v_from": np.array([1.0, 2.0]), "np": np}
+    exec(run("order planar_two_link --to", str(file)).text, space)
+    assert np.allclose(space["q_to"], [np.degrees(2), 5 - np.degrees(1)])
+    assert np.allclose(space["v_to"], [np.degrees(2), -np.degrees(1)])
 
 
-def test_a_wrong_convention_is_one_line(tmp_path: Path) -> None:
-    done = run("jacobian", "ur5", "--convention", "mujocco")
+def test_a_wrong_convention_is_one_line_with_the_nearest(tmp_path: Path) -> None:
+    done = run("jacobian ur5 --convention mujocco")
     assert (done.code, done.err.count("\n")) == (2, 1)
-    done = run("jacobian", "panda", "--convention", "mujoco")
-    assert done.code == 2
-    assert "--no-mimic" in done.err
-    assert run("jacobian", "panda", "--convention", "mujoco", "--no-mimic").code == 0
-    done = run("acceleration", "ur5", "--convention", "mujoco", "--breakdown")
-    assert done.code == 2
+    assert "--no-mimic" in refused("jacobian panda --convention mujoco")
+    assert run("jacobian panda --convention mujoco --no-mimic").code == 0
+    refused("acceleration ur5 --convention mujoco --breakdown")
+    assert "unknown convention 'mujocco'; did you mean mujoco" in refused("order a1 --to mujocco")
 
 
 @pytest.mark.parametrize(
@@ -117,13 +122,61 @@ def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
         "loaded = [name for name in sys.modules if name.startswith('urdfkin.model.conventions')]\n"
         "print(done.code, len(done.text.splitlines()) > 100, loaded)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python(code)
     assert done.stdout == "0 True []\n"
 
 
-def test_wxyz_is_the_quaternion_with_its_scalar_first() -> None:
-    x, w = (
-        run("placement", "ur5", "--q", "random", "--as", form, "--format", "json").data["result"][0]
-        for form in ("quaternion", "wxyz")
-    )
-    assert w == [*x[:3], x[6], *x[3:6]]
+# -- urdfkin order ---------------------------------------------------------------------------------
+
+
+TOOLS = [name for name in BUILT_IN if name != "idyntree"]
+
+
+def test_a_row_is_a_joint_and_a_column_a_convention() -> None:
+    lines = run("order a1 --root-joint floating --format csv").text.splitlines()
+    table = [line.split(",") for line in lines]
+    assert table[0] == ["joint", *TOOLS]
+    robot = urdfkin.load("a1", root_joint="floating", verify=False)
+    assert [row[0] for row in table[1:]] == list(robot.joint_names)
+    for k, name in enumerate(TOOLS, 1):
+        for row in table[1:]:
+            q, _, v = row[k].partition("/")
+            first = int((v or q).split("-")[0])
+            assert robot.convention(name).rate_names[first].split(".")[0] == row[0]
+
+
+def test_tools_with_the_same_indices_share_a_column_and_json_has_the_librarys_numbers() -> None:
+    text = run("order a1").text
+    assert "urdfkin: also pinocchio, kdl, isaacgym" in text
+    names = ["joint", "urdfkin", "urdf", "isaaclab", "isaaclab3", "alphabetical"]
+    assert text.splitlines()[1].split() == names
+    data = run("order a1 --to isaaclab --format json").data
+    permutation = urdfkin.load("a1", verify=False).convention("isaaclab").permutation
+    assert permutation is not None
+    assert data["q"]["reordering"]["index"] == permutation.tolist()
+    every = run("order a1 --format json").data["conventions"]
+    assert list(every) == TOOLS
+    assert every["isaaclab"]["sources"]
+
+
+@pytest.mark.parametrize(
+    ("start", "end"), list(itertools.product(("mujoco", "isaaclab", "drake", "pinocchio"), repeat=2))
+)
+def test_the_printed_code_converts(start: str, end: str) -> None:
+    text = run("order tiago --from", start, "--to", end, "--root-joint", "floating").text
+    robot = urdfkin.load("tiago", root_joint="floating", verify=False)
+    rng = np.random.default_rng(0)
+    q, v = robot.sample(1)[0], rng.standard_normal(robot.nv)
+    q_from, v_from = robot.convention(start).to(q, v)
+    space: dict[str, Any] = {
+        "q_from": q_from,
+        "v_from": v_from,
+        "np": np,
+        "robot": robot,
+        "six_from": np.arange(6),
+    }
+    exec(text, space)
+    q_to, v_to = robot.convention(end).to(q, v)
+    assert np.allclose(space["q_to"], q_to, 0, 1e-14)
+    assert np.allclose(space["v_to"], v_to, 0, 1e-14)
+    assert ("six_to" in text) == ((start == "drake") != (end == "drake"))

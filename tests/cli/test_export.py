@@ -1,7 +1,5 @@
 """`urdfkin export`: a file with its proof, and its check."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -10,75 +8,50 @@ from pathlib import Path
 import pytest
 
 from tests.attacks.hostile import urdf
-from tests.cli.running import urdfkin
+from tests.cli.running import good, urdfkin
 
 
 @pytest.mark.slow
 def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
     path = tmp_path / "elbow.py"
     words = ("--to", "numpy", "--quantity", "jacobian,velocity", "--quantity", "placement", "-o", str(path))
-    done = urdfkin("export", "planar_two_link", *words)
+    done = urdfkin("export planar_two_link", *words)
     assert (done.code, done.out) == (0, b"")
     assert "verified by Pinocchio" in done.err
-    checked = urdfkin("export", "--check", str(path))
-    assert checked.code == 0
+    checked = good("export --check", str(path))
     assert re.findall(r"^good (\w+): 4 test vectors", checked.text, re.MULTILINE) == [
         "jacobian",
         "velocity",
         "placement",
     ]
     path.write_text(path.read_text("utf-8").replace("cos(q_", "sin(q_"), "utf-8")
-    wrong = urdfkin("export", "--check", str(path))
+    wrong = urdfkin("export --check", str(path))
     assert wrong.code == 1
     assert "WRONG placement" in wrong.text
 
 
-def test_it_goes_to_standard_output_where_no_file_is_named() -> None:
-    done = urdfkin("export", "planar_two_link", "--to", "c", "--name", "my arm")
-    assert done.code == 0
+def test_standard_output_has_the_file_and_commands_nobody() -> None:
+    done = good("export planar_two_link --to c --name", "my arm")
     assert "void my_arm_jacobian_batch(size_t n" in done.text
+    done = urdfkin("export - --to numpy --no-verify", stdin=urdf("x ##vso[task.setvariable]y ::error::"))
+    assert done.code == 3
+    assert "##vso[" not in done.text
 
 
 def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
     path = tmp_path / "arm.py"
-    done = urdfkin("export", "planar_two_link", "--no-verify", "--to", "numpy", "-o", str(path))
+    done = urdfkin("export planar_two_link --no-verify --to numpy -o", str(path))
     assert done.code == 3
     assert "UNVERIFIED" in path.read_text("utf-8").splitlines()[0]
-    checked = urdfkin("export", "--check", str(path))
+    checked = urdfkin("export --check", str(path))
     assert checked.code == 3
     assert "UNVERIFIED" in checked.err
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ((), "give either a ROBOT to export, or --check FILE"),
-        (("planar_two_link", "--check", "x.c"), "give either a ROBOT to export, or --check FILE"),
-        (("--check", "x.c", "--to", "c"), "--to does nothing with --check"),
-        (("--check", "nowhere.c"), "cannot be read"),
-        (("planar_two_link", "--quantity", "speed"), "speed"),
-        (("planar_two_link", "--frame", "nowhere"), "nowhere"),
-    ],
-)
-def test_a_mistake_is_one_clear_line(words: tuple[str, ...], said: str) -> None:
-    done = urdfkin("export", *words)
-    assert done.code == 2
-    assert said in done.err
-    assert done.err.count("\n") == 1
-
-
-def test_a_file_on_a_terminal_commands_nobody() -> None:
-    done = urdfkin(
-        "export", "-", "--to", "numpy", "--no-verify", stdin=urdf("x ##vso[task.setvariable]y ::error::")
-    )
-    assert done.code == 3
-    assert "##vso[" not in done.text
 
 
 @pytest.fixture(scope="module")
 def exported() -> str:
     """A small file of NumPy."""
-    return urdfkin("export", "planar_two_link", "--to", "numpy", "--quantity", "placement").text
+    return urdfkin("export planar_two_link --to numpy --quantity placement").text
 
 
 CHANGES = {
@@ -101,7 +74,7 @@ def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: st
     assert changed != exported
     path = tmp_path / "arm.py"
     path.write_text(changed, "utf-8")
-    done = urdfkin("export", "--check", str(path))
+    done = urdfkin("export --check", str(path))
     assert done.code == 3
     assert "good placement: 4 test vectors" in done.text
     assert "UNVERIFIED: the file " in done.err
@@ -109,10 +82,20 @@ def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: st
 
 
 @pytest.mark.slow
-def test_a_file_with_other_line_ends_is_still_as_it_was_written(exported: str, tmp_path: Path) -> None:
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_line_ends_change_nothing_and_a_check_includes_nothing_that_lies_beside_the_file(
+    exported: str, tmp_path: Path
+) -> None:
     path = tmp_path / "arm.py"
     path.write_bytes(exported.replace("\n", "\r\n").encode())
-    assert urdfkin("export", "--check", str(path)).code == 0
+    assert urdfkin("export --check", str(path)).code == 0
+    path = tmp_path / "arm.c"
+    path.write_text(urdfkin("export planar_two_link --to c --quantity placement").text, "utf-8")
+    (tmp_path / "math.h").write_text("#error run by urdfkin")
+    assert urdfkin("export --check", str(path)).code == 0
+    path.write_text('#include "own.h"\n' + path.read_text("utf-8"), "utf-8")
+    (tmp_path / "own.h").write_text("")
+    assert urdfkin("export --check", str(path)).code == 2
 
 
 @pytest.mark.slow
@@ -122,23 +105,8 @@ def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: s
     planted.parent.mkdir(parents=True)
     planted.write_text(f"open({str(mark)!r}, 'w').close()")
     (tmp_path / "arm" / "arm.py").write_text(exported, "utf-8")
-    done = urdfkin("export", "--check", str(tmp_path / "arm" / "arm.py"))
-    assert done.code == 0, done.err
+    good("export --check", str(tmp_path / "arm" / "arm.py"))
     assert not mark.exists()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-def test_a_check_includes_nothing_that_lies_beside_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "arm.c"
-    path.write_text(
-        urdfkin("export", "planar_two_link", "--to", "c", "--quantity", "placement").text, "utf-8"
-    )
-    (tmp_path / "math.h").write_text("#error run by urdfkin")
-    assert urdfkin("export", "--check", str(path)).code == 0
-    path.write_text('#include "own.h"\n' + path.read_text("utf-8"), "utf-8")
-    (tmp_path / "own.h").write_text("")
-    assert urdfkin("export", "--check", str(path)).code == 2
 
 
 @pytest.mark.slow
@@ -154,8 +122,8 @@ def test_octave_is_told_the_functions_name_and_never_the_files(
     )
     octave.chmod(0o700)
     monkeypatch.setenv("PATH", f"{octave.parent}:{os.environ['PATH']}")
-    text = urdfkin("export", "planar_two_link", "--to", "matlab", "--quantity", "placement").text
+    text = urdfkin("export planar_two_link --to matlab --quantity placement").text
     path.write_text(text, "utf-8")
-    assert urdfkin("export", "--check", str(path)).code == 0
+    assert urdfkin("export --check", str(path)).code == 0
     assert (tmp_path / "said").read_text().splitlines()[-1] == "planar_two_link_tip_kinematics().check();"
     assert (tmp_path / "there").read_text() == "planar_two_link_tip_kinematics.m\n"

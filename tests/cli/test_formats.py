@@ -1,14 +1,22 @@
-"""Every command that prints a table has every format of a table."""
+"""Every table has every format, a file's suffix selects it, and a file is written whole or not at all."""
 
 import csv
+import errno
 import io
 import json
+import os
+import tempfile
+import tomllib
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from tests.cli.running import urdfkin
-from urdfkin.cli.output import Answer
+from tests.cli.running import refused, urdfkin
+from urdfkin.cli.output import Answer, check_writable, write_file
+from urdfkin.dh import read_table
+from urdfkin.errors import SourceError
 from urdfkin.errors.display import Code, Matrix, Strong, Table, TextDocument
 
 #: A command line -> a word of its table, as text and in LaTeX.
@@ -69,7 +77,7 @@ def test_csv_has_one_width_and_numbers_that_stay_numbers(line: str) -> None:
 )
 def test_the_suffix_of_a_file_selects_the_format_of_a_table(suffix: str, begin: str, tmp_path: Path) -> None:
     path = tmp_path / f"table{suffix}"
-    done = urdfkin("jacobian", "ur5", "-o", str(path))
+    done = urdfkin("jacobian ur5 -o", str(path))
     assert (done.code, done.out, done.err) == (0, b"", "")
     text = path.read_text()
     assert text.startswith(begin)
@@ -77,13 +85,13 @@ def test_the_suffix_of_a_file_selects_the_format_of_a_table(suffix: str, begin: 
 
 
 def test_the_check_is_part_of_json_or_is_printed_beside_the_data() -> None:
-    done = urdfkin("chain", "ur5", "--format", "json")
+    done = urdfkin("chain ur5 --format json")
     assert done.err == ""
     assert done.data["verified"] is True
     assert done.data["check"].startswith("Pinocchio")
-    done = urdfkin("chain", "ur5", "--format", "csv")
+    done = urdfkin("chain ur5 --format csv")
     assert done.err.startswith("Pinocchio")
-    done = urdfkin("chain", "ur5", "--no-verify", "--format", "json")
+    done = urdfkin("chain ur5 --no-verify --format json")
     assert (done.code, done.data["verified"]) == (3, False)
 
 
@@ -103,3 +111,140 @@ def test_a_document_has_matrices_code_and_emphasis_in_every_format() -> None:
     assert "| `c_d` | -0.5 |" in markdown
     assert html.count("<td") == 6
     assert r"\begin{bmatrix}1 & -20 \\ 300 & 4\end{bmatrix}" in latex
+
+
+# -- suffixes --------------------------------------------------------------------------------------
+
+
+ELBOW = str(Path(__file__).parents[2] / "robots" / "elbow.urdf")
+WORDS = ("jacobian", "elbow", "--q", "random:2")
+
+
+def test_each_ending_gets_its_form_and_the_same_numbers(tmp_path: Path) -> None:
+    for ending in ("npy", "json", "csv", "CSV"):
+        assert urdfkin(*WORDS, "-o", str(tmp_path / f"J.{ending}")).code == 0
+    J = np.load(tmp_path / "J.npy")
+    assert J.shape == (2, 6, 6)
+    assert (np.array(json.loads((tmp_path / "J.json").read_text())["result"]) == J).all()
+    lines = [line.split(",") for line in (tmp_path / "J.csv").read_text().splitlines()]
+    assert (np.array([line[2:] for line in lines[1:]], dtype=float).reshape(2, 6, 6) == J).all()
+    assert (tmp_path / "J.CSV").read_bytes() == (tmp_path / "J.csv").read_bytes()
+
+
+def test_the_form_stands_where_the_ending_says_nothing_and_a_breakdown_goes_by_it_too(tmp_path: Path) -> None:
+    assert urdfkin(*WORDS, "--format", "json", "-o", str(tmp_path / "J.dat")).code == 0
+    assert len(json.loads((tmp_path / "J.dat").read_text())["result"]) == 2
+    assert urdfkin(*WORDS, "-o", str(tmp_path / "J")).code == 0
+    assert (tmp_path / "J").read_text().startswith("sample,row,joint_1")
+    words = ("acceleration", "elbow", "--breakdown", "--v", "random", "-o", str(tmp_path / "parts.json"))
+    assert urdfkin(*words).code == 0
+    assert json.loads((tmp_path / "parts.json").read_text())["quantity"] == "acceleration breakdown"
+
+
+@pytest.mark.slow
+def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
+    for ending in ("toml", "json", "csv", "urdf", "tex", "md", "c", "py", "m"):
+        assert urdfkin("dh elbow -o", str(tmp_path / f"t.{ending}")).code == 0
+    rows = [read_table(tmp_path / f"t.{ending}").rows for ending in ("toml", "json", "csv")]
+    assert rows[0] == rows[1] == rows[2]
+    assert tomllib.loads((tmp_path / "t.toml").read_text())["convention"] == "standard"
+    starts = {
+        "urdf": "<robot",
+        "md": "**elbow: ",
+        "tex": "\\begin{table}",
+        "m": "% Kinematics of elbow",
+        "c": "/*",
+    }
+    for ending, start in starts.items():
+        assert (tmp_path / f"t.{ending}").read_text().startswith(start), ending
+    assert urdfkin("dh elbow --format roboticstoolbox -o", str(tmp_path / "r.py")).code == 0
+    assert "roboticstoolbox" in (tmp_path / "r.py").read_text()
+    assert "contradicts the file's suffix" in refused("dh elbow --format toml -o", str(tmp_path / "t.json"))
+
+
+@pytest.mark.slow
+def test_a_validation_names_its_verdict_and_the_files_it_wrote(tmp_path: Path) -> None:
+    html, data = str(tmp_path / "r.html"), str(tmp_path / "r.json")
+    done = urdfkin("validate elbow --samples 1 --html", html, "--json", data)
+    *_, summary, wrote = done.text.splitlines()
+    assert summary.startswith("verified: 1 robot, ")
+    assert wrote == f"wrote {data}, {html}"
+
+
+@pytest.mark.parametrize("style", ["terminal", "json"])
+def test_a_file_that_could_not_be_read_was_not_checked(style: str, tmp_path: Path) -> None:
+    done = urdfkin("check", ELBOW, str(tmp_path / "none.urdf"), "--format", style)
+    assert done.code == 2
+    if style == "json":
+        assert done.data["files"] == [ELBOW]
+    else:
+        assert done.text == "no findings in 1 file\n"
+
+
+# -- written whole ---------------------------------------------------------------------------------
+
+
+def test_a_file_that_is_written_is_alone_in_its_folder_with_the_rights_it_had(tmp_path: Path) -> None:
+    place = tmp_path / "out.json"
+    write_file(place, b"first")
+    assert place.stat().st_mode & 0o777 == 0o666 & ~_umask()
+    place.chmod(0o640)
+    write_file(place, b"second")
+    assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
+    assert (place.read_bytes(), place.stat().st_mode & 0o777) == (b"second", 0o640)
+
+
+@pytest.mark.parametrize("where", ["chmod", "replace"])
+def test_what_cannot_be_finished_leaves_the_file_as_it_was_and_nothing_beside_it(
+    where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / "out.json"
+    place.write_bytes(b"before")
+
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, where, full)
+    with pytest.raises(SourceError, match="No space left"):
+        write_file(place, b"after")
+    assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
+    assert place.read_bytes() == b"before"
+
+
+def test_a_file_is_written_through_a_link_and_asking_for_it_leaves_nothing(tmp_path: Path) -> None:
+    check_writable(tmp_path / "out.json", None)
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(SourceError, match="cannot be written"):
+        check_writable(tmp_path / "no such folder" / "out.json")
+    (tmp_path / "there").mkdir()
+    link = tmp_path / "link.json"
+    link.symlink_to(tmp_path / "there" / "out.json")
+    write_file(link, b"data")
+    assert link.is_symlink()
+    assert [path.name for path in (tmp_path / "there").iterdir()] == ["out.json"]
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def test_a_disc_that_is_full_while_writing_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = tempfile.NamedTemporaryFile
+
+    def made(*words: Any, **how: Any) -> Any:
+        stream = right(*words, **how)
+
+        def write(_: bytes) -> int:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        stream.write = write  # type: ignore[assignment]
+        return stream
+
+    monkeypatch.setattr(tempfile, "NamedTemporaryFile", made)
+    with pytest.raises(SourceError, match="No space left"):
+        write_file(tmp_path / "out.json", b"data")
+    assert list(tmp_path.iterdir()) == []

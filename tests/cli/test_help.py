@@ -3,8 +3,6 @@
 import glob
 import os
 import shlex
-import subprocess
-import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -13,7 +11,7 @@ import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import imported, process, urdfkin
+from tests.cli.running import Done, good, imported, process, python, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from urdfkin.cli import _ABSENT, _SYNONYMS, cli, commands, groups
 from urdfkin.robot import Robot
@@ -37,16 +35,23 @@ def run_examples(command: str) -> None:
     assert examples(command)
     for example in examples(command):
         words = [sorted(glob.glob(word)) or [word] for word in shlex.split(example)]  # noqa: PTH207  relative
-        done = urdfkin(*(word for expanded in words for word in expanded))
-        assert done.code == 0, (example, done.err, done.text)
+        done = good(*(word for expanded in words for word in expanded))
         assert done.out or done.err
 
 
-def test_every_command_stands_on_the_help_page_with_a_summary() -> None:
+def test_the_help_page_has_every_command_the_version_pinocchios_and_the_families_that_exist() -> None:
     text = urdfkin("--help").text
     for name, (_, summary) in commands().items():
         assert f"  {name} " in text
         assert summary.split()[0] in text
+    group = click.Context(cli)
+    for name in commands():
+        assert isinstance(cli.get_command(group, name), click.Command)
+    done = good("--version")
+    assert done.text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
+    page = " ".join(urdfkin("robots --help").text.split())
+    named = page.partition("Show only the robots of one family: ")[2].partition(".")[0].split(", ")
+    assert named == sorted({entry.family for entry in catalogue().values()})
 
 
 def elbow() -> str:
@@ -57,8 +62,7 @@ def elbow() -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize("command", commands())
 def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
-    done = urdfkin(command, "--help")
-    assert done.code == 0
+    done = good(command, "--help")
     assert done.text.startswith(f"Usage: urdfkin {command} ")
     assert examples(command)
     assert urdfkin(command, "-h").out == done.out
@@ -93,20 +97,17 @@ def test_the_examples_of_validation_run_one_after_the_other(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my.urdf").write_text(urdf_of("tree_1"))
     for name in ("results", "main", "branch"):
-        assert urdfkin("validate", "ur5", "--samples", "10", "--json", f"{name}.json").code == 0
-    assert urdfkin("validate", "ur5", "--samples", "10", "--store", "nightly").code == 0
+        assert urdfkin("validate ur5 --samples 10 --json", f"{name}.json").code == 0
+    assert urdfkin("validate ur5 --samples 10 --store nightly").code == 0
     for command in AFTER_WORK:
         run_examples(command)
 
 
-def test_help_imports_nothing_heavy() -> None:
+def test_help_imports_nothing_heavy_of_any_command() -> None:
     for words in ("import urdfkin", "import urdfkin.cli", "from urdfkin.cli import cli; cli.get_help"):
         code = f"import sys; {words}; print(sorted({HEAVY!r} & set(sys.modules)))"
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        done = python(code)
         assert done.stdout == "[]\n"
-
-
-def test_a_commands_help_imports_neither_numpy_nor_pinocchio() -> None:
     assert imported(["--help", *(f"{command} --help" for command in commands())], HEAVY) == {}
 
 
@@ -124,34 +125,28 @@ def _seconds() -> float:
     return end.children_user + end.children_system - begin.children_user - begin.children_system
 
 
-def test_the_version_names_pinocchios_too() -> None:
-    done = urdfkin("--version")
-    assert done.code == 0
-    assert done.text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
-
-
-def test_every_summary_and_module_is_there() -> None:
-    group = click.Context(cli)
-    for name in commands():
-        assert isinstance(cli.get_command(group, name), click.Command)
-
-
-def test_the_families_that_the_help_names_are_those_that_exist() -> None:
-    page = " ".join(urdfkin("robots", "--help").text.split())
-    named = page.partition("Show only the robots of one family: ")[2].partition(".")[0].split(", ")
-    assert named == sorted({entry.family for entry in catalogue().values()})
-
-
-def test_each_other_word_for_a_command_leads_to_a_command_and_is_none_itself() -> None:
+def test_words_for_commands_lead_to_commands_and_these_have_the_librarys_names() -> None:
     assert set(_SYNONYMS) & set(commands()) == set()
     assert set(_ABSENT) & (set(commands()) | set(_SYNONYMS)) == set()
     for meant in _SYNONYMS.values():
         assert meant.split()[0] in commands()
-
-
-def test_a_command_that_computes_has_the_librarys_name() -> None:
     own = set(groups()["Compute"]) | {"dh", "screws", "chain", "export", "view"}
     assert [name for name in own if not hasattr(Robot, name.replace("-", "_"))] == []
     assert [
         name for name in ("same", "diff", "calibrate", "validate", "check") if not hasattr(library, name)
     ] == []
+
+
+def explain(topic: str) -> Done:
+    return urdfkin("explain", topic)
+
+
+def test_an_equations_number_gives_its_page_and_no_other_number_does() -> None:
+    page = explain("7.130")
+    assert page.code == 0, page.err
+    for part in ("Equation 7.130", "w-dot_0i x d_{i-1,i}", "Robot.acceleration", "Pinocchio", "tests/text/"):
+        assert part in page.text
+    assert "page 2" in explain("7.8").text
+    answer = explain("7.131")
+    assert answer.code == 2
+    assert answer.text == ""

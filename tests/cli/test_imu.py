@@ -1,24 +1,18 @@
 """`urdfkin imu` and `urdfkin singular-values`: the library's numbers in every form."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import urdfkin
+from tests.cli.running import good, refused, urdfkin
+from tests.cli.test_trajectory_option import write
 from tests.laws.test_imu import moving_base
 from urdfkin.model.tree import FloatArray
-
-
-def save(path: Path, **arrays: Any) -> None:
-    np.savez(path, **arrays)
 
 
 @pytest.fixture
@@ -34,22 +28,10 @@ def test_a_csv_file_and_an_archive_of_the_same_motion_give_the_librarys_numbers(
     robot = library.load("ur5")
     q, v, a = (motion[x] for x in "qva")
     expected = robot.imu(q, v, a, "tool0", gravity=[0.0, 1.0, -9.8])
-    save(tmp_path / "log.npz", **motion)
-    names = ["t", *robot.coordinate_names, *(f"{x}:{name}" for x in "va" for name in robot.rate_names)]
-    table = np.column_stack([motion[x] for x in "tqva"])
-    lines = [",".join(names), *(",".join(map(repr, row)) for row in table.tolist())]
-    (tmp_path / "log.csv").write_text("\n".join(lines))
+    np.savez(tmp_path / "log.npz", **motion)
+    write(tmp_path / "log.csv", robot, motion)
     for log in ("log.csv", "log.npz"):
-        words = [
-            "imu",
-            "ur5",
-            "--frame",
-            "tool0",
-            "--gravity",
-            "0,1,-9.8",
-            "--trajectory",
-            str(tmp_path / log),
-        ]
+        words = ["imu ur5 --frame tool0 --gravity 0,1,-9.8 --trajectory", str(tmp_path / log)]
         document = json.loads(urdfkin(*words, "--format", "json").out)
         assert (document["result"], document["t"]) == (expected.tolist(), motion["t"].tolist())
         assert (document["quantity"], document["verified"]) == ("imu", True)
@@ -67,14 +49,13 @@ def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_ar
     base = moving_base(4, 3)
     fields = {f"base_{name}": getattr(base, name) for name in ("placement", "velocity", "acceleration")}
     path = tmp_path / "log.npz"
-    save(path, **motion, **fields)
+    np.savez(path, **motion, **fields)
     words = ["imu", "ur5", "--frame", "tool0", "--trajectory", str(path), "--format", "json"]
     q, v, a = (motion[x] for x in "qva")
     expected = library.load("ur5").imu(q, v, a, "tool0", base=base)
     assert json.loads(urdfkin(*words).out)["result"] == expected.tolist()
-    save(path, q=motion["q"])
-    done = urdfkin(*words)
-    assert done.code == 0
+    np.savez(path, q=motion["q"])
+    done = good(*words)
     assert "rates by central differences" in done.err
 
 
@@ -98,31 +79,29 @@ def test_an_archive_of_anything_else_is_refused_in_one_line(
     arrays: dict[str, FloatArray], words: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.npz"
-    save(path, **arrays)
-    done = urdfkin("imu", "ur5", "--trajectory", str(path))
-    assert done.code == 2
-    assert words in done.err
-    assert str(path) in done.err
-    assert len(done.err.strip().splitlines()) == 1
+    np.savez(path, **arrays)
+    err = refused("imu ur5 --trajectory", str(path))
+    assert words in err
+    assert str(path) in err
+    assert len(err.strip().splitlines()) == 1
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\x03\x04 broken", b"t,q\n1,2\n"])
 def test_what_is_no_archive_is_refused_too(data: bytes, tmp_path: Path) -> None:
     path = tmp_path / "log.npz"
     path.write_bytes(data)
-    done = urdfkin("imu", "ur5", "--trajectory", str(path))
-    assert done.code == 2
-    assert "not an .npz file of numbers" in done.err
+    assert "not an .npz file of numbers" in refused("imu ur5 --trajectory", str(path))
 
 
 def test_options_without_effect_and_half_a_vector_are_refused(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
-    save(tmp_path / "log.npz", **motion)
-    done = urdfkin("imu", "ur5", "--trajectory", str(tmp_path / "log.npz"), "--v", "random")
-    assert (done.code, "--v does nothing along a --trajectory" in done.err) == (2, True)
-    assert "none for z" in urdfkin("imu", "ur5", "--gravity", "0,9.81").err
-    assert urdfkin("imu", "ur5", "--no-verify").code == 3
+    np.savez(tmp_path / "log.npz", **motion)
+    assert "--v does nothing along a --trajectory" in refused(
+        "imu ur5 --trajectory", str(tmp_path / "log.npz"), "--v", "random"
+    )
+    assert "none for z" in urdfkin("imu ur5 --gravity 0,9.81").err
+    assert urdfkin("imu ur5 --no-verify").code == 3
 
 
 def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -> None:
@@ -158,11 +137,11 @@ def test_what_is_no_number_is_null_in_json() -> None:
 
 
 def test_a_singularity_is_explained_in_place_of_a_gradient() -> None:
-    text = urdfkin("singular-values", "ur5", "--frame", "tool0", "--q", "neutral").text
+    text = urdfkin("singular-values ur5 --frame tool0 --q neutral").text
     assert "Singular within rounding: rank 5 of 6" in text
     assert "Lost direction: rotation of tool0 about (1, 0, 0), in world axes." in text
     assert "wrist_1_joint are parallel and lie in one plane." in text
     assert "nan" not in text
-    regular = urdfkin("singular-values", "ur5", "--frame", "tool0", "--q", "random").text
+    regular = urdfkin("singular-values ur5 --frame tool0 --q random").text
     assert "ingular within" not in regular
     assert "manipulability changes by" in regular

@@ -1,7 +1,5 @@
 """`urdfkin info`: the tree as it hangs, and all that a joint needs in one line."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -49,9 +47,15 @@ def test_the_guides_say_whom_each_link_hangs_from(name: str) -> None:
     assert parents_of_the_drawing(drawn) == [-1, *(one.parent for one in tree.joints)]
 
 
-def test_only_children_do_not_move_to_the_right_however_long_the_chain() -> None:
+def test_another_order_is_told_with_the_first_joint_and_guides_of_only_children_do_not_move() -> None:
     rows = [(joint(f"j{k}"), f"l{k}", f"l{k + 1}") for k in range(300)]
     assert set(guides(build_tree("long", "l0", rows))) == {""}
+    urdf = to_urdf(forked())
+    assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same order")
+    swapped = urdf.replace('joint name="a"', 'joint name="z"')  # its place in the file stays, ours moves
+    assert "differs: z is number 1 in the file and b here; " in urdfkin("info", swapped).text.splitlines()[-1]
+    # A root joint stands in no file.
+    assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("the same order")
 
 
 def test_a_follower_names_its_leader_and_an_axis_its_letter() -> None:
@@ -72,22 +76,10 @@ def test_a_follower_names_its_leader_and_an_axis_its_letter() -> None:
     assert cells["D"] == ["held", "fixed"]
 
 
-def test_a_file_with_another_order_is_told_with_the_first_joint_that_differs() -> None:
-    urdf = to_urdf(forked())
-    assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same order")
-    swapped = urdf.replace('joint name="a"', 'joint name="z"')  # its place in the file stays, ours moves
-    assert "differs: z is number 1 in the file and b here; " in urdfkin("info", swapped).text.splitlines()[-1]
-    # A root joint stands in no file.
-    assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("the same order")
-
-
-def test_a_joint_of_several_numbers_shows_where_all_of_them_are() -> None:
+def test_a_joint_of_several_numbers_shows_where_all_are_and_the_last_links_are_tips() -> None:
     text = urdfkin("info", to_urdf(forked()), "--root-joint", "floating").text
     (line,) = [line for line in text.splitlines() if "root_joint" in line]
     assert line.split()[1:5] == ["root_joint", "floating", "q[0:7]", "v[0:6]"]
-
-
-def test_the_last_links_are_named_as_tips() -> None:
     assert "; tips: D, F, B" in urdfkin("info", to_urdf(forked())).text
 
 

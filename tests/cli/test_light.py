@@ -1,7 +1,6 @@
-"""`check` works where nothing but click is installed: pre-commit's hook installs no more."""
+"""`check` works where nothing but click is installed, and a command is one thread."""
 
-from __future__ import annotations
-
+import os
 import re
 import subprocess
 import sys
@@ -9,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.running import python
+
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 ROBOT = str(ROOT / "robots" / "elbow.urdf")
 
@@ -44,10 +46,9 @@ def installed() -> list[str]:
 
 def bare(*words: str) -> subprocess.CompletedProcess[str]:
     code = BARE.format(words=words, installed=installed())
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    return python(code, check=False)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("style", ["terminal", "json", "sarif", "github"])
 def test_the_hooks_command_needs_what_the_hook_installs(style: str) -> None:
     assert "entry: urdfkin check\n" in hook()
@@ -56,18 +57,13 @@ def test_the_hooks_command_needs_what_the_hook_installs(style: str) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.slow
-def test_so_does_the_command_that_explains_what_it_found(tmp_path: Path) -> None:
+def test_so_does_the_command_that_explains_and_one_that_needs_more_says_so(tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
     done = bare("check", str(bad))
     assert done.returncode == 1, done.stderr
     assert "run 'urdfkin explain URDF411' for details" in done.stdout
     assert bare("explain", "URDF411").returncode == 0
-
-
-@pytest.mark.slow
-def test_a_command_that_needs_more_says_so() -> None:
     done = bare("placement", ROBOT)
     assert done.returncode == 2
     found = re.fullmatch(
@@ -77,3 +73,25 @@ def test_a_command_that_needs_more_says_so() -> None:
     )
     assert found is not None
     assert found[1] not in installed()
+
+
+#: The command, then how many threads there are.
+COUNTED = """
+import os, sys
+from urdfkin.cli import main
+sys.argv = ["urdfkin", "structure", "planar_two_link"]
+try:
+    main()
+finally:
+    print(len(os.listdir("/proc/self/task")))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="no /proc")
+@pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one processor")
+def test_numpys_linear_algebra_starts_no_threads_in_a_command() -> None:
+    plain = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run(
+        [sys.executable, "-c", COUNTED], capture_output=True, text=True, check=True, env=plain
+    )
+    assert done.stdout.splitlines()[-1] == "1"

@@ -1,6 +1,4 @@
-"""`urdfkin placement` in other forms and frames, `analytical-jacobian`, and a base that moves."""
-
-from __future__ import annotations
+"""`urdfkin placement` in other forms, `analytical-jacobian`, a base that moves, an acceleration's parts."""
 
 import csv
 import io
@@ -12,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import urdfkin as library
-from tests.cli.running import urdfkin
+from tests.cli.running import good, refused, urdfkin
 from urdfkin.cli import quantity
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.kinematics.rotation import SEQUENCES
@@ -42,13 +40,18 @@ def test_few_numbers_are_the_same_pose(written: str, relative_to: str | None) ->
     np.testing.assert_array_equal(np.array(rows[1:], dtype=float)[:, 1:], found)
 
 
-def test_the_table_says_from_where_and_in_which_units() -> None:
-    text = urdfkin("placement", "ur5", "--relative-to", "forearm_link").text
+def test_the_table_says_from_where_and_in_which_units_and_a_base_does_nothing_to_a_relative_placement() -> (
+    None
+):
+    text = urdfkin("placement ur5 --relative-to forearm_link").text
     assert "ur5: placement of tool0, relative to forearm_link" in text
     assert "axis of forearm_link" in text
-    text = urdfkin("placement", "ur5", "--as", "rpy").text
+    text = urdfkin("placement ur5 --as rpy").text
     assert "roll, pitch, yaw [rad]" in text
-    assert "qw" in urdfkin("placement", "ur5", "--as", "quaternion").text
+    assert "qw" in urdfkin("placement ur5 --as quaternion").text
+    assert "--base-placement does nothing with --relative-to" in refused(
+        "placement ur5 --relative-to base_link --base-placement", MOVED
+    )
 
 
 def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,7 +59,7 @@ def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.Monk
 
     right = rotation.rpy_of
     monkeypatch.setattr(rotation, "rpy_of", lambda R: right(R)[..., ::-1])
-    done = urdfkin("placement", "ur5", "--q", "random", "--as", "rpy")
+    done = urdfkin("placement ur5 --q random --as rpy")
     assert (done.code, done.out) == (1, b"")
     assert "the orientation of tool0 (rpy) disagrees with Pinocchio's" in done.err
     (again,) = [
@@ -71,19 +74,20 @@ def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.Monk
 def test_where_roll_and_yaw_turn_about_one_axis_the_numbers_are_right_all_the_same() -> None:
     """A vertical pitch is where many arms rest: the two angles are not determined, the rotation is."""
     half = "1.5707963267948966"
-    done = urdfkin("placement", "ur5", "--base-placement", f"0,0,0,0.3,{half},0.2", "--frame", "base_link",
-                   "--as", "rpy", "--format", "json")  # fmt: skip
-    assert done.code == 0, done.err
+    done = good(
+        "placement ur5 --base-placement",
+        f"0,0,0,0.3,{half},0.2",
+        "--frame",
+        "base_link",
+        "--as",
+        "rpy",
+        "--format",
+        "json",
+    )
     turn = Rotation.from_euler("xyz", done.data["result"][0][3:]).as_matrix()
     np.testing.assert_allclose(
         turn, Rotation.from_euler("xyz", [0.3, float(half), 0.2]).as_matrix(), atol=1e-15
     )
-
-
-def test_a_base_does_nothing_to_a_relative_placement_and_that_is_said() -> None:
-    done = urdfkin("placement", "ur5", "--relative-to", "base_link", "--base-placement", MOVED)
-    assert done.code == 2
-    assert "--base-placement does nothing with --relative-to" in done.err
 
 
 # -- the analytical Jacobian ---------------------------------------------------------------------------
@@ -101,15 +105,14 @@ def test_the_analytical_jacobian_is_the_librarys_with_its_rows_named(representat
     assert done.data["rows"][3] in urdfkin(*words).text
 
 
-def test_it_knows_every_sequence() -> None:
+def test_forms_are_told_apart_every_sequence_is_known_and_a_singularity_is_told_with_the_cure() -> None:
     assert set(REPRESENTATIONS) == {"rpy", "quaternion", *SEQUENCES}
-
-
-def test_a_representational_singularity_is_told_with_the_cure() -> None:
-    done = urdfkin("analytical-jacobian", "planar_two_link", "--q", "0.3,0.4")
-    assert done.code == 2
-    assert "representational singularity" in done.err
-    assert "another sequence or by a quaternion" in done.err
+    err = refused("analytical-jacobian planar_two_link --q 0.3,0.4")
+    assert "representational singularity" in err
+    assert "another sequence or by a quaternion" in err
+    labels = [row.labels for row in quantity._FORMS.values()]
+    assert sorted(map(len, labels)) == [6, 7, 7]
+    assert len(set(labels)) == len(labels)
 
 
 # -- a base that moves ---------------------------------------------------------------------------------
@@ -137,8 +140,7 @@ def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) ->
         : len(TAKES[command]) // 2
     ]
     words = [command, "ur5", "--q", "random", *(word for x in given for word in (x, "random"))]
-    done = urdfkin(*words, "--base-placement", MOVED, *TAKES[command], "--format", "json")
-    assert done.code == 0, done.err
+    done = good(*words, "--base-placement", MOVED, *TAKES[command], "--format", "json")
     data, robot = done.data, library.load("ur5")
     inputs: list[Any] = [np.array(data[x]) for x in "qva" if x in data]
     method = getattr(robot, command.replace("-", "_"))
@@ -150,8 +152,7 @@ def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) ->
 
 
 def test_an_explained_acceleration_has_the_bases_part() -> None:
-    done = urdfkin("acceleration", "ur5", "--breakdown", "--base-acceleration", "0,0,9.81,0,0,0")
-    assert done.code == 0, done.err
+    done = good("acceleration ur5 --breakdown --base-acceleration 0,0,9.81,0,0,0")
     assert [line.split()[-4] for line in done.text.splitlines() if line.startswith("base ")] == ["9.81"]
 
 
@@ -165,32 +166,57 @@ def test_a_batch_of_bases_goes_with_one_configuration_and_with_as_many(tmp_path:
     T[:, :3, :3], T[:, :3, 3] = Rotation.from_quat(rows[:, 3:]).as_matrix(), rows[:, :3]
     robot = library.load("ur5")
     for q in ("neutral", "random:4"):
-        done = urdfkin("placement", "ur5", "--q", q, "--base-placement", f"@{path}", "--format", "json")
-        assert done.code == 0, done.err
+        done = good("placement ur5 --q", q, "--base-placement", f"@{path}", "--format", "json")
         expected: FloatArray = robot.placement(done.data["q"], "tool0", base=BaseMotion(T))
         np.testing.assert_allclose(done.data["result"], expected, atol=1e-14)
-    done = urdfkin("placement", "ur5", "--q", "random:3", "--base-placement", f"@{path}")
-    assert done.code == 2
-    assert "batches of q, v, a and the base motion have different lengths: found 3, 3, 3, 4, 1, 1" in done.err
+    assert "batches of q, v, a and the base motion have different lengths: found 3, 3, 3, 4, 1, 1" in refused(
+        "placement ur5 --q random:3 --base-placement", f"@{path}"
+    )
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--base-placement", "0,0,0"], "6 numbers are expected (x, y, z, roll, pitch, yaw)"),
-        (["--base-placement", "0,0,0,0,0,0,2"], "must be a unit quaternion: found norm 2"),
-        (["--base-velocity", "0,0,0,0,0,x"], "--base-velocity, wz: not a finite number: found 'x'"),
-        (["--base-acceleration", "0,0,0,0,0,0"], "No such option"),
-        (["--base-velocity", "@nowhere.csv"], "nowhere.csv: cannot be read"),
-    ],
-)
-def test_a_base_that_is_none_is_refused_with_its_option(words: list[str], message: str) -> None:
-    done = urdfkin("velocity", "ur5", *words)
-    assert (done.code, done.out) == (2, b"")
-    assert message in done.err
+# -- the parts of an acceleration, and the rate of the Jacobian ------------------------------------
 
 
-def test_the_forms_are_told_apart_by_their_rows() -> None:
-    labels = [row.labels for row in quantity._FORMS.values()]
-    assert sorted(map(len, labels)) == [6, 7, 7]
-    assert len(set(labels)) == len(labels)
+POLAR = ["polar", "--q", "0.3,0.7", "--v", "1,2", "--a", "0.5,-1"]
+
+
+@pytest.mark.slow
+def test_the_parts_of_the_polar_robots_acceleration_are_shown_with_their_sum() -> None:
+    result = good("acceleration", *POLAR, "--breakdown")
+    rows = [line.split() for line in result.text.splitlines() if line.strip().startswith(("joint_", "sum"))]
+    assert [row[:2] for row in rows[:-1]] == [
+        ["joint_1", "transverse"],
+        ["joint_1", "centripetal"],
+        ["joint_2", "coriolis"],
+        ["joint_2", "sliding"],
+    ]
+    sums = np.array([[float(x) for x in row[2:]] for row in rows[:-1]]).sum(axis=0)
+    assert np.abs(sums - [float(x) for x in rows[-1][1:]]).max() < 2e-3
+    assert "verified by Pinocchio" in result.text
+
+
+@pytest.mark.slow
+def test_as_data_the_parts_sum_to_the_acceleration() -> None:
+    result = urdfkin("acceleration", *POLAR, "--breakdown", "--format", "json")
+    document = result.data
+    terms = np.array(document["terms"])
+    assert terms.shape == (1, 2, 4, 6)
+    assert document["kinds"] == ["transverse", "centripetal", "coriolis", "sliding"]
+    total = np.array(document["base"]) + terms.sum(axis=2).sum(axis=1)
+    assert np.array_equal(total, document["total"])
+    expected = library.load("polar").acceleration([0.3, 0.7], [1.0, 2.0], [0.5, -1.0], "slider")
+    assert np.abs(total[0] - expected).max() <= 1e-14
+    assert document["verified"] is True
+    result = urdfkin("acceleration", *POLAR, "--breakdown", "--format", "csv")
+    rows = list(csv.DictReader(io.StringIO(result.text)))
+    assert [row["kind"] for row in rows] == ["transverse", "centripetal", "coriolis", "sliding", ""]
+    assert float(rows[-1]["vx"]) == pytest.approx(sum(float(row["vx"]) for row in rows[:-1]), abs=1e-14)
+
+
+@pytest.mark.slow
+def test_the_rate_of_the_jacobian_has_a_command() -> None:
+    result = good("jacobian-rate", *POLAR[:5], "--format", "json")
+    document = result.data
+    expected = library.load("polar").jacobian_rate([0.3, 0.7], [1.0, 2.0], "slider")
+    assert np.array_equal(document["result"][0], expected)
+    assert document["v"] == [[1.0, 2.0]]

@@ -1,14 +1,12 @@
 """Progress says what is done, how fast, how long still and what failed; in lines where nobody watches."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from tests.cli.running import urdfkin
+from tests.cli.running import good, urdfkin
 from urdfkin.cli import campaign
 from urdfkin.cli.campaign import Pace, line
 from urdfkin.validation.collector import CampaignProgress
@@ -28,7 +26,7 @@ class Clock:
         return self.now
 
 
-def test_what_was_kept_from_before_makes_nobody_fast() -> None:
+def test_what_was_kept_or_compiled_before_makes_nobody_fast_or_slow() -> None:
     clock = Clock()
     pace = Pace(clock)
     assert pace.of(replace(STANDING, chunks_done=10)) == (None, None)
@@ -39,9 +37,6 @@ def test_what_was_kept_from_before_makes_nobody_fast() -> None:
         " failed; panda"
     )
     assert "3 failed" in line(replace(STANDING, failures=3), pace)
-
-
-def test_what_was_compiled_before_makes_nobody_slow() -> None:
     clock = Clock()
     pace = Pace(clock)
     clock.now += 90.0
@@ -50,56 +45,32 @@ def test_what_was_compiled_before_makes_nobody_slow() -> None:
     assert pace.of(STANDING) == (4.0, 128.5)
 
 
-def test_programs_are_told_in_json_from_the_first_to_the_last_chunk() -> None:
-    done = urdfkin("validate", "planar_two_link", "nosuch", "--samples", "50", "--json-progress")
+def test_programs_are_told_in_json_from_before_any_work_to_the_last_chunk() -> None:
+    done = urdfkin("validate planar_two_link nosuch --samples 50 --json-progress")
     lines = [json.loads(text) for text in done.err.splitlines() if text.startswith("{")]
     assert lines[-1]["chunks_done"] == lines[-1]["chunks"] == 4
     assert (lines[-1]["robots_done"], lines[-1]["failures"]) == (2, 1)
     assert lines[-1]["seconds_left"] == 0.0
     assert set(lines[0]) == {*STANDING.__slots__, "chunks_per_second", "seconds_left"}
-
-
-def test_the_first_is_told_before_any_work_so_that_a_pace_counts_from_there() -> None:
-    done = urdfkin("validate", "planar_two_link", "--samples", "50", "--json-progress")
+    done = urdfkin("validate planar_two_link --samples 50 --json-progress")
     first = next(json.loads(text) for text in done.err.splitlines() if text.startswith("{"))
     assert (first["chunks_done"], first["chunks"], first["label"]) == (0, 2, "planar_two_link")
     assert first["chunks_per_second"] is None
 
 
 def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "chunks" not in urdfkin("validate", "planar_two_link", "--samples", "50").err
+    assert "chunks" not in urdfkin("validate planar_two_link --samples 50").err
     monkeypatch.setattr(campaign, "_LINES", 0.0)
-    done = urdfkin("validate", "planar_two_link", "--samples", "50")
+    done = urdfkin("validate planar_two_link --samples 50")
     assert "urdfkin: 1 of 1 robots, 2 of 2 chunks; " in done.err
     assert done.err.endswith("left, none failed; planar_two_link\n")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--retry", "failed"], "need --store"),
-        (["--shard", "1/2"], "need --store"),
-        (["--store", "s", "--shard", "1/2", "--json", "x"], "a shard has no report"),
-        (["--store", "s", "--shard", "3/2"], "must have the form i/n"),
-        (["--scheduler", "local:2", "--jobs", "2"], "--scheduler cannot be combined"),
-        (["--scheduler", "local:none"], "N in local:N must be the number"),
-    ],
-)
-def test_options_that_do_not_go_together_are_refused(
-    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = urdfkin("validate", "planar_two_link", "--samples", "0", *words)
-    assert done.code == 2
-    assert said in done.err
 
 
 @pytest.mark.slow
 def test_a_shard_says_what_it_came_to_and_what_comes_next(tmp_path: Path) -> None:
     where = str(tmp_path / "s")
     words = ("validate", "planar_two_link", "double_pendulum", "--samples", "0", "--store", where)
-    done = urdfkin(*words, "--shard", "2/2")
-    assert done.code == 0
+    done = good(*words, "--shard", "2/2")
     assert f"shard 2/2 of {where}: 1 robot, " in done.text
     assert "next: run `urdfkin report merge" in done.text
     assert urdfkin("report", where).code == 130

@@ -3,8 +3,6 @@
 One run of `validate` is a process of its own; the others call the entry point here.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -26,17 +24,22 @@ def urdfkin(*words: str | Path) -> Done:
 
 
 @pytest.fixture(scope="module")
-def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("data") / "good.json"
-    path.write_text(json.dumps(arms()))
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two reports, one of them of a run that failed."""
+    path = tmp_path_factory.mktemp("data")
+    for name, document in (("good", arms()), ("bad", failing())):
+        (path / f"{name}.json").write_text(json.dumps(document))
     return path
 
 
-@pytest.fixture(scope="module")
-def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("data") / "bad.json"
-    path.write_text(json.dumps(failing()))
-    return path
+@pytest.fixture
+def good(folder: Path) -> Path:
+    return folder / "good.json"
+
+
+@pytest.fixture
+def bad(folder: Path) -> Path:
+    return folder / "bad.json"
 
 
 @pytest.mark.slow
@@ -83,16 +86,15 @@ def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> 
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in later]
 
 
-def test_report_prints_where_no_form_is_asked_for_and_exits_as_the_run_did(good: Path, bad: Path) -> None:
+def test_report_prints_where_no_form_is_asked_for_exits_as_the_run_did_and_hands_out_the_schema(
+    good: Path, bad: Path
+) -> None:
     done = urdfkin("report", good)
     assert done.code == 0
     assert "2 robots" in done.text
     done = urdfkin("report", bad)
     assert done.code == 1
     assert "urdfkin velocity panda --frame" in done.text
-
-
-def test_report_hands_out_the_schema() -> None:
     done = urdfkin("report", "--schema")
     assert json.loads(done.text)["$id"] == "urn:urdfkin:validation:1"
 
@@ -125,30 +127,6 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     words = " ".join(done.text.split())
     assert f"ur5: joint {joint['name']}, axis: z -> -z, rotated by 3.142 rad" in words
     assert words.endswith("no regression, 1 change (exit 0: changes without a regression)")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("report", "none.json"), "none.json: cannot be read"),
-        (("report",), "name the file"),
-        (("report", "compare", "none.json", "none.json"), "cannot be read"),
-        (("validate", "ur5", "--html", "/nowhere/a.html"), "/nowhere/a.html: cannot be written"),
-        (("plot", "ur5", "-o", "a.svg"), "--to VALUES"),
-        (("plot", "ur5", "--to", "neutral", "-o", "/nowhere/a.svg"), "cannot be written"),
-        (("plot", "ur5", "--to", "neutral", "-o", "a.bmp"), "unknown picture format"),
-        (("plot", "ur5", "--to", "random:3", "-o", "a.svg"), "--from and --to need one configuration each"),
-    ],
-)
-def test_mistakes_are_one_line_and_exit_2(
-    words: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = urdfkin(*words)
-    assert done.code == 2, (done.text, done.err)
-    assert message in done.err
-    assert "Traceback" not in done.err
 
 
 def test_an_unwritable_report_spoils_no_file_that_is_there(tmp_path: Path) -> None:

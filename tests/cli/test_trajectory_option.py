@@ -1,7 +1,5 @@
 """`--trajectory FILE`: each row is the command at that configuration, in any units and names of the file."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path
@@ -12,7 +10,10 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
+from tests.urdfs import joint
+from tests.urdfs import robot as robot_of
 from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import by_command
@@ -66,13 +67,10 @@ def commands_with(*names: str) -> dict[str, set[str]]:
     return found
 
 
-def test_every_command_that_takes_joint_values_has_a_convention() -> None:
+def test_every_command_that_takes_joint_values_has_a_convention_and_of_a_batch_a_trajectory() -> None:
     found = commands_with("q", "trajectory", "poses")
     assert {*COMMANDS, "placement", "chain", "plot", "view", "calibrate"} <= found.keys()
     assert [name for name, given in found.items() if "convention" not in given] == []
-
-
-def test_every_command_that_takes_a_batch_takes_a_trajectory() -> None:
     of_one_configuration = {"chain"}
     found = commands_with("q").items()
     assert {name for name, given in found if "trajectory" not in given} == of_one_configuration
@@ -84,8 +82,7 @@ def test_each_row_has_the_bits_of_the_single_command(
 ) -> None:
     inputs, *options = COMMANDS.get(command, ["q"])
     words = (command, "panda", "--frame", "panda_hand", *options)
-    done = run(*words, "--trajectory", str(log), "--format", "json")
-    assert done.code == 0, done.err
+    done = good(*words, "--trajectory", str(log), "--format", "json")
     assert done.data["t"] == motion["t"].tolist()
     assert f" {N} " in done.data["check"]
     results = [key for key in done.data if key in ("result", "singular_values", "manipulability_gradient")]
@@ -117,20 +114,19 @@ def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArra
         assert head[1:3] == ["vx panda_joint1", "vx panda_joint2"]
 
 
-def test_every_sample_is_checked_and_the_worst_case_is_printed(log: Path) -> None:
-    line = run("velocity", "panda", "--frame", "panda_hand", "--trajectory", str(log)).text.splitlines()[-1]
+def test_every_sample_is_checked_and_a_breakdown_has_the_times_too(
+    log: Path, motion: dict[str, FloatArray]
+) -> None:
+    line = run("velocity panda --frame panda_hand --trajectory", str(log)).text.splitlines()[-1]
     assert f"{N} velocity results, worst disagreement " in line
     assert "of the bound" in line
-
-
-def test_a_breakdown_has_the_times_too(motion: dict[str, FloatArray], log: Path) -> None:
     words = ("acceleration", "panda", "--frame", "panda_hand", "--breakdown", "--trajectory", str(log))
     head, first, *_ = csv.reader(io.StringIO(run(*words, "--format", "csv").text))
     assert head[:3] == ["t", "joint", "kind"]
     assert float(first[0]) == motion["t"][0]
 
 
-def test_degrees_and_milliseconds_in_a_heading_are_the_texts_with_these_units(tmp_path: Path) -> None:
+def test_units_in_a_heading_are_those_of_the_texts_also_in_a_batch_of_q(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(
         "time [ms],joint_1 [deg],joint_2_deg,v:joint_1_deg_s,v:joint_2 [deg/s]\n250,30,-7.7,90,1e1\n"
@@ -140,11 +136,8 @@ def test_degrees_and_milliseconds_in_a_heading_are_the_texts_with_these_units(tm
     one = run(*words, "--q", "30deg,-7.7deg", "--v", "90deg/s,10deg/s").data
     assert (along["result"], along["q"], along["v"]) == (one["result"], one["q"], one["v"])
     assert along["t"] == [0.25]
-
-
-def test_units_are_read_in_a_batch_of_q_too(tmp_path: Path) -> None:
     (tmp_path / "q.csv").write_text("joint_2_deg,joint_1\n90,0.5\n")
-    found = run("placement", "planar_two_link", "--q", f"@{tmp_path / 'q.csv'}", "--format", "json").data
+    found = run("placement planar_two_link --q", f"@{tmp_path / 'q.csv'}", "--format", "json").data
     assert found["q"] == [[0.5, np.pi / 2]]
 
 
@@ -166,8 +159,7 @@ def test_a_file_in_a_convention_gives_the_results_of_the_robot_in_it(name: str, 
         str(path),
     )
     for command in ("placement", "velocity", "acceleration", "jacobian", "analytical-jacobian", "imu"):
-        done = run(command, "a1", *words, "--format", "json")
-        assert done.code == 0, done.err
+        done = good(command, "a1", *words, "--format", "json")
         method = getattr(other, command.replace("-", "_"))
         inputs = COMMANDS.get(command, ["q"])[0]
         options = {"representation": "quaternion"} if command == "analytical-jacobian" else {}
@@ -199,10 +191,7 @@ def test_a_placement_needs_no_time_and_keeps_the_angles_of_the_file(tmp_path: Pa
     """Differences need three samples and unwrapped angles; a placement does not."""
     path = tmp_path / "log.csv"
     path.write_text("wheel\n3.1\n")
-    (tmp_path / "w.urdf").write_text(
-        '<robot name="w"><link name="a"/><link name="b"/><joint name="wheel" type="continuous">'
-        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>'
-    )
+    (tmp_path / "w.urdf").write_text(robot_of(joint("wheel", "continuous", "a", "b"), name="w"))
     words = (str(tmp_path / "w.urdf"), "--trajectory", str(path))
     assert run("placement", *words, "--format", "csv").text.splitlines()[1].startswith("0,")
     assert "at least 3 samples" in run("velocity", *words).err
@@ -252,9 +241,7 @@ def test_a_base_of_the_options_or_of_the_file_moves_the_robot(
 
 @pytest.mark.parametrize("option", ["--q=ready", "--seed=1"])
 def test_a_value_beside_a_trajectory_is_refused(option: str, log: Path) -> None:
-    done = run("placement", "panda", "--trajectory", str(log), option)
-    assert done.code == 2
-    assert "does nothing along a --trajectory" in done.err
+    assert "does nothing along a --trajectory" in refused("placement panda --trajectory", str(log), option)
 
 
 def _spoiled(log: Path) -> dict[str, tuple[str, str]]:
@@ -285,17 +272,18 @@ def _spoiled(log: Path) -> dict[str, tuple[str, str]]:
 def test_what_is_wrong_with_a_file_is_one_line(what: str, log: Path) -> None:
     text, message = _spoiled(log)[what]
     log.write_text(text)
-    done = run("placement", "panda", "--trajectory", str(log))
+    done = run("placement panda --trajectory", str(log))
     assert (done.code, done.err.count("\n")) == (2, 1)
     assert message in done.err
 
 
 @pytest.mark.parametrize("command", ["placement", "singular-values", "chain", "imu", "view"])
 def test_an_unknown_convention_points_to_the_list_of_all(command: str) -> None:
-    done = run(command, "panda", "--convention", "mujocco", *(["--q", "ready"] if command == "view" else []))
-    assert done.code == 2
-    assert "did you mean mujoco" in done.err
-    assert "`urdfkin order ROBOT` lists all" in done.err
+    err = refused(
+        command, "panda", "--convention", "mujocco", *(["--q", "ready"] if command == "view" else [])
+    )
+    assert "did you mean mujoco" in err
+    assert "`urdfkin order ROBOT` lists all" in err
 
 
 def test_a_chain_reads_q_in_a_convention_and_says_so() -> None:
@@ -326,15 +314,14 @@ def test_measured_poses_in_a_convention_and_in_degrees_are_those_in_radians(tmp_
         np.savetxt(path, np.hstack([values[name], p]), delimiter=",", header=f"{head},x,y,z", comments="")
         how = str(tmp_path / "motors.toml")
         more = ["--convention", how] if name == "motors" else []
-        done = run(
-            "calibrate", "planar_two_link", "--poses", str(path), "--fit", "base", *more, "--format", "json"
+        done = good(
+            "calibrate planar_two_link --poses", str(path), "--fit", "base", *more, "--format", "json"
         )
-        assert done.code == 0, done.err
         found[name] = done.data["origins"]
     for name in ("degrees", "motors"):
-        for joint, T in found["plain"].items():
-            np.testing.assert_allclose(found[name][joint], T, atol=1e-9)
-    table = run("calibrate", "planar_two_link", "--convention", "mujoco")
+        for place, T in found["plain"].items():
+            np.testing.assert_allclose(found[name][place], T, atol=1e-9)
+    table = run("calibrate planar_two_link --convention mujoco")
     assert "--convention does nothing without --poses" in table.err
 
 
@@ -351,8 +338,7 @@ def test_a_plot_reads_the_motion_in_a_convention(tmp_path: Path) -> None:
         words = ("plot", "planar_two_link", "--frame", "tip", *given, "--convention", str(how), "--samples=5")
         if "--trajectory" in given:
             words = words[:-1]
-        done = run(*words, "--panel", "position", "-o", str(tmp_path / "x.svg"))
-        assert done.code == 0, done.err
+        good(*words, "--panel", "position", "-o", str(tmp_path / "x.svg"))
         end = robot.placement([np.pi / 6, np.pi / 2], "tip")[:2, 3]
         title = " ".join((tmp_path / "x.svg").read_text().split())
         assert f"to ({end[0]:.3g}, {end[1]:.3g}, 0)" in title
@@ -368,9 +354,6 @@ def test_a_hundred_thousand_rows_are_read_computed_and_checked(tmp_path: Path) -
         header=",".join(["time", *robot.coordinate_names]),
     )  # fmt: skip
     out = tmp_path / "v.csv"
-    done = run(
-        "velocity", "ur5", "--frame", "tool0", "--trajectory", str(tmp_path / "log.csv"), "-o", str(out)
-    )
-    assert done.code == 0
+    done = good("velocity ur5 --frame tool0 --trajectory", str(tmp_path / "log.csv"), "-o", str(out))
     assert f"{n} velocity results" in done.err
     assert len(out.read_text().splitlines()) == n + 1

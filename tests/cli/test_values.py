@@ -3,14 +3,17 @@
 import csv
 import io
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import process, urdfkin
+from tests.cli.running import good, process, refused, urdfkin
 from tests.robots.odd_urdfs import urdf_of
+from tests.urdfs import joint
+from tests.urdfs import robot as robot_of
 from urdfkin.dh import read_table
 from urdfkin.dh.parse_table import references
 from urdfkin.model.configuration import sample
@@ -18,32 +21,22 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
 
 QUANTITIES = {
-    "placement": "q",
-    "velocity": "qv",
-    "jacobian": "q",
-    "jacobian-rate": "qv",
-    "hessian": "q",
+    "placement": "q", "velocity": "qv", "jacobian": "q", "jacobian-rate": "qv", "hessian": "q",
     "acceleration": "qva",
-}
+}  # fmt: skip
 Q = (0.1, -0.5, 1 / 3, -2.0, 2**-0.5, 1.5, 0.8, 0.02)
 
 
 def expected(quantity: str, n: int, reference: str) -> FloatArray:
     """What the library computes for samples 0 to n-1 of seed 7, drawn as the command draws them."""
-    robot = library.load("panda")
-    rng = np.random.default_rng(7)
-    q = sample(robot.tree, n, rng)
-    v = rng.standard_normal((n, robot.nv)) if "v" in QUANTITIES[quantity] else q
-    a = rng.standard_normal((n, robot.nv)) if "a" in QUANTITIES[quantity] else q
-    frame = "panda_hand"
-    return {
-        "placement": lambda: robot.placement(q, frame),
-        "velocity": lambda: robot.velocity(q, v, frame, reference),
-        "jacobian": lambda: robot.jacobian(q, frame, reference),
-        "jacobian-rate": lambda: robot.jacobian_rate(q, v, frame, reference),
-        "hessian": lambda: robot.hessian(q, frame, reference),
-        "acceleration": lambda: robot.acceleration(q, v, a, frame, reference),
-    }[quantity]()
+    robot, rng = library.load("panda"), np.random.default_rng(7)
+    inputs = [
+        sample(robot.tree, n, rng),
+        *(rng.standard_normal((n, robot.nv)) for _ in QUANTITIES[quantity][1:]),
+    ]
+    how = {} if quantity == "placement" else {"reference": reference}
+    result: FloatArray = getattr(robot, quantity.replace("-", "_"))(*inputs, "panda_hand", **how)
+    return result
 
 
 def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
@@ -52,8 +45,7 @@ def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
         words += ["--reference", reference]
     for letter in QUANTITIES[quantity]:
         words += [f"--{letter}", f"random:{n}"]
-    done = urdfkin(*words)
-    assert done.code == 0, done.err
+    done = good(*words)
     return done.out
 
 
@@ -126,16 +118,16 @@ def test_info_folds_no_name_and_puts_each_joints_numbers_in_its_line_or_the_next
     monkeypatch.setenv("COLUMNS", str(columns))
     lines = urdfkin("info", name).text.splitlines()
     robot = library.load(name)
-    for i, joint in enumerate(robot.tree.joints):
-        if not joint.kind.nv:
+    for i, one in enumerate(robot.tree.joints):
+        if not one.kind.nv:
             continue
-        (at,) = [k for k, line in enumerate(lines[2:], 2) if joint.name in line.lstrip("│├└ ").split()[:3]]
+        (at,) = [k for k, line in enumerate(lines[2:], 2) if one.name in line.lstrip("│├└ ").split()[:3]]
         # Only names that are longer than the terminal run over its edge.
-        found = " ".join(lines[at : at + (1 if joint.kind.value in lines[at].split() else 2)]).split()
-        assert {robot.link_names[i + 1], joint.kind.value, f"q[{robot.tree.q_index[i]}]"} <= set(found)
-        if joint.limit is not None and np.isfinite(joint.limit.upper):
+        found = " ".join(lines[at : at + (1 if one.kind.value in lines[at].split() else 2)]).split()
+        assert {robot.link_names[i + 1], one.kind.value, f"q[{robot.tree.q_index[i]}]"} <= set(found)
+        if one.limit is not None and np.isfinite(one.limit.upper):
             k = found.index(f"v[{robot.tree.v_index[i]}]")
-            limits = (joint.limit.lower, joint.limit.upper, joint.limit.velocity)
+            limits = (one.limit.lower, one.limit.upper, one.limit.velocity)
             assert found[k + 1 : k + 4] == [f"{limit:.6g}" for limit in limits]
 
 
@@ -160,9 +152,7 @@ def test_the_catalogue_folds_no_name_and_is_no_wider_than_the_terminal(
 
 
 def test_the_json_says_all_that_is_needed_to_use_it() -> None:
-    data = urdfkin(
-        "acceleration", "panda", "--q", "random", "--v", "random", "--a", "random", "--format", "json"
-    ).data
+    data = urdfkin("acceleration panda --q random --v random --a random --format json").data
     assert data["robot"] == "panda"
     assert data["frame"] == "panda_hand_tcp"
     assert data["reference"] == "local_world_aligned"
@@ -176,10 +166,17 @@ def test_the_json_says_all_that_is_needed_to_use_it() -> None:
     assert np.array_equal(again, data["result"])
 
 
-def test_numbers_are_taken_as_they_are_written() -> None:
-    data = urdfkin("placement", "panda", "--q", ",".join(map(repr, Q)), "--format", "json").data
+def test_numbers_are_taken_as_they_are_written_by_name_in_degrees_or_with_blanks() -> None:
+    data = urdfkin("placement panda --q", ",".join(map(repr, Q)), "--format", "json").data
     assert data["q"] == [list(Q)]
     assert np.array_equal(data["result"][0], library.load("panda").placement(Q, "panda_hand_tcp"))
+    named = good("jacobian panda --q", f"ready,{NAMED}", "--format", "json")
+    assert "warning" not in named.err
+    assert named.data["q"] == [RADIANS]
+    blanks = urdfkin("jacobian panda --q", f"[{' '.join(map(repr, RADIANS))}]", "--format", "json")
+    assert blanks.data["result"] == named.data["result"]
+    done = urdfkin("placement panda --q ready,panda_joint1=30 --no-verify")
+    assert "warning: joint panda_joint1: 30 is outside [-2.8973, 2.8973]; degrees? write 30deg" in done.err
 
 
 @pytest.mark.parametrize("layout", ["plain", "header", "header in another order", "crlf and bom", "comments"])
@@ -199,94 +196,77 @@ def test_a_batch_comes_from_a_csv_file_with_or_without_a_header(layout: str, tmp
         text = "\ufeff" + text.replace("\n", "\r\n")
     path = tmp_path / "q.csv"
     path.write_text(text, encoding="utf-8", newline="")
-    done = urdfkin("jacobian", "panda", "--q", f"@{path}", "--format", "npy")
-    assert done.code == 0, done.err
+    done = good("jacobian panda --q", f"@{path}", "--format", "npy")
     assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(q, "panda_hand_tcp"))
 
 
 def test_a_batch_may_come_from_standard_input_as_a_robot_may() -> None:
     robot = library.load("ur5")
     rows = "\n".join(",".join(map(repr, row)) for row in robot.sample(3, 1).tolist())
-    done = urdfkin("jacobian", "ur5", "--q", "@-", "--format", "npy", stdin=rows)
+    done = urdfkin("jacobian ur5 --q @- --format npy", stdin=rows)
     assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(robot.sample(3, 1), robot.tip_frame))
-    done = urdfkin("jacobian", "-", "--frame", "tool0", "--format", "json", stdin=robot.urdf)
-    assert done.code == 0, done.err
+    done = good("jacobian - --frame tool0 --format json", stdin=robot.urdf)
     assert done.data["source"] == "-"
     assert np.array_equal(done.data["result"][0], robot.jacobian(np.zeros(6), "tool0"))
 
 
-def test_one_sample_of_v_goes_with_a_batch_of_q() -> None:
-    done = urdfkin("velocity", "ur5", "--q", "random:5", "--v", "1,0,0,0,0,0", "--format", "json")
+def test_a_batch_goes_with_one_sample_a_seed_repeats_it_and_a_long_one_is_shown_in_part() -> None:
+    done = urdfkin("velocity ur5 --q random:5 --v 1,0,0,0,0,0 --format json")
     assert np.shape(done.data["v"]) == (5, 6)
-    done = urdfkin("velocity", "ur5", "--q", "random:5", "--v", "random:4")
-    assert (done.code, done.out) == (2, b"")
-    assert "different lengths: found 5, 4" in done.err
-
-
-def test_a_seed_gives_the_same_numbers_and_another_one_others() -> None:
+    assert "different lengths: found 5, 4" in refused("velocity ur5 --q random:5 --v random:4")
     one, again, other = (
-        urdfkin("jacobian", "panda", "--q", "random:2", "--seed", seed, "--format", "csv").out
-        for seed in ("3", "3", "4")
+        urdfkin("jacobian panda --q random:2 --seed", seed, "--format", "csv").out for seed in ("3", "3", "4")
     )
     assert one == again
     assert one != other
-
-
-def test_a_long_batch_is_shown_in_part_and_says_where_the_rest_is() -> None:
-    text = urdfkin("velocity", "ur5", "--q", "random:9", "--v", "random").text
+    text = urdfkin("velocity ur5 --q random:9 --v random").text
     assert "sample 4" in text
     assert "sample 5" not in text
     assert "4 more samples" in text
 
 
-def test_output_goes_to_a_file_whole_and_the_check_to_stderr(tmp_path: Path) -> None:
+def test_output_goes_to_a_file_whole_through_a_link_or_to_a_device_and_the_check_to_stderr(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "J.npy"
-    done = urdfkin("jacobian", "panda", "--format", "npy", "--output", str(path))
+    done = urdfkin("jacobian panda --format npy --output", str(path))
     assert (done.code, done.out) == (0, b"")
     assert "verified by Pinocchio" in done.err
     assert np.load(path).shape == (1, 6, 8)
     assert [entry.name for entry in tmp_path.iterdir()] == ["J.npy"]
-
-
-def test_an_output_that_is_a_link_or_a_device_is_written_through(tmp_path: Path) -> None:
     target, link = tmp_path / "target.csv", tmp_path / "link.csv"
     target.write_text("old")
     link.symlink_to(target)
-    assert urdfkin("jacobian", "panda", "--format", "csv", "-o", str(link)).code == 0
+    assert urdfkin("jacobian panda --format csv -o", str(link)).code == 0
     assert link.is_symlink()
     assert target.read_text().startswith("sample,row,panda_joint1")
-    assert urdfkin("jacobian", "panda", "--format", "csv", "-o", "/dev/null").code == 0
+    assert urdfkin("jacobian panda --format csv -o /dev/null").code == 0
     assert Path("/dev/null").is_char_device()
-    dash = urdfkin("jacobian", "panda", "--format", "csv", "-o", "-")
+    dash = urdfkin("jacobian panda --format csv -o -")
     assert dash.text.startswith("sample,row,panda_joint1")
 
 
-def test_limits_that_are_left_are_warned_of_by_name_and_computed_all_the_same() -> None:
-    done = urdfkin("placement", "panda", "--q", "0,0,0,-1,0,0,0,0.5", "--format", "json")
-    assert done.code == 0
+def test_the_default_frame_is_the_catalogues_tip_limits_are_warned_of_and_mimic_joints_follow_as_asked() -> (
+    None
+):
+    assert "jacobian of panda_hand_tcp" in urdfkin("jacobian panda").text
+    assert "jacobian of tool0" in urdfkin("jacobian ur5").text
+    done = good("placement panda --q 0,0,0,-1,0,0,0,0.5 --format json")
     assert "warning: joint panda_finger_joint1: 0.5 is outside [0, 0.04]" in done.err
     assert "warning: joint panda_finger_joint2: 0.5 is outside [0, 0.04]" in done.err
     assert "panda_joint4" not in done.err
     assert done.data["verified"] is True
-
-
-def test_the_default_frame_is_said_and_is_the_catalogues_tip() -> None:
-    assert "jacobian of panda_hand_tcp" in urdfkin("jacobian", "panda").text
-    assert "jacobian of tool0" in urdfkin("jacobian", "ur5").text
+    assert len(urdfkin("jacobian panda --format json").data["rates"]) == 8
+    assert len(urdfkin("jacobian panda --no-mimic --format json").data["rates"]) == 9
+    assert urdfkin("jacobian alex_psyonic_hands").code == 0
+    assert urdfkin("jacobian alex_psyonic_hands --mimic").code == 2
 
 
 @pytest.mark.parametrize("root_joint", ["planar", "floating"])
 def test_a_root_joint_adds_its_coordinates(root_joint: str) -> None:
-    data = urdfkin("velocity", "a1", "--root-joint", root_joint, "--v", "random", "--format", "json").data
+    data = urdfkin("velocity a1 --root-joint", root_joint, "--v", "random", "--format", "json").data
     assert data["rates"][0] == "root_joint.vx"
     assert len(data["q"][0]) == 12 + (7 if root_joint == "floating" else 3)
-
-
-def test_mimic_joints_follow_or_are_free_as_asked() -> None:
-    assert len(urdfkin("jacobian", "panda", "--format", "json").data["rates"]) == 8
-    assert len(urdfkin("jacobian", "panda", "--no-mimic", "--format", "json").data["rates"]) == 9
-    assert urdfkin("jacobian", "alex_psyonic_hands").code == 0
-    assert urdfkin("jacobian", "alex_psyonic_hands", "--mimic").code == 2
 
 
 @pytest.mark.slow
@@ -295,25 +275,20 @@ def test_mimic_joints_follow_or_are_free_as_asked() -> None:
 def test_odd_robots_pass_through_the_command(quantity: str, name: str) -> None:
     words = [word for letter in QUANTITIES[quantity] for word in (f"--{letter}", "random:2")]
     for format_ in ("table", "json", "csv", "npy"):
-        done = urdfkin(quantity, "-", *words, "--format", format_, stdin=urdf_of(name))
-        assert done.code == 0, done.err
+        done = good(quantity, "-", *words, "--format", format_, stdin=urdf_of(name))
         assert done.out
 
 
-def test_without_verification_exit_3_says_so() -> None:
-    done = urdfkin("jacobian", "panda", "--no-verify")
+def test_a_table_is_a_robot_to_every_command_and_without_verification_exit_3_says_so() -> None:
+    done = urdfkin("jacobian panda --no-verify")
     assert done.code == 3
     assert "NOT VERIFIED" in done.text
     assert "the check was turned off by verify=False" in done.text
-    done = urdfkin("jacobian", "panda", "--no-verify", "--format", "json")
+    done = urdfkin("jacobian panda --no-verify --format json")
     assert done.code == 3
     assert done.data["verified"] is False
-
-
-def test_a_table_is_a_robot_to_every_command() -> None:
     path = str(references()["ur5"])
-    done = urdfkin("jacobian", path, "--q", "0.1,0.2,0.3,0.4,0.5,0.6", "--format", "json")
-    assert done.code == 0, done.err
+    done = good("jacobian", path, "--q", "0.1,0.2,0.3,0.4,0.5,0.6", "--format", "json")
     robot = library.load(read_table(path))
     J = robot.jacobian([0.1, 0.2, 0.3, 0.4, 0.5, 0.6], robot.tip_frame)
     assert json.loads(done.out)["result"] == [J.tolist()]
@@ -337,13 +312,9 @@ def test_names_are_never_folded_nothing_wraps_and_no_line_ends_in_blanks_in_a_pi
 ) -> None:
     monkeypatch.setenv("COLUMNS", columns)
     path = tmp_path / f"{LONG}.urdf"
-    path.write_text(
-        f'<robot name="{LONG}_robot"><link name="{LONG}_base"/><link name="{LONG}_tool"/>'
-        f'<joint name="{LONG}" type="continuous"><parent link="{LONG}_base"/><child link="{LONG}_tool"/>'
-        '<origin xyz="1 0 0"/><axis xyz="0 1 0"/></joint></robot>'
-    )
-    done = urdfkin(*words.replace("ROBOT", str(path)).split())
-    assert done.code == 0, done.err
+    arm = joint(LONG, "continuous", f"{LONG}_base", f"{LONG}_tool", 'xyz="1 0 0"', "0 1 0")
+    path.write_text(robot_of(arm, name=f"{LONG}_robot"))
+    done = good(*words.replace("ROBOT", str(path)).split())
     assert not any(line.endswith(" ") for line in done.text.splitlines())
     named = [line for line in done.text.splitlines() if "a_joint_of" in line]
     assert named
@@ -358,22 +329,22 @@ def test_names_are_never_folded_nothing_wraps_and_no_line_ends_in_blanks_in_a_pi
 # -- locked joints -----------------------------------------------------------------------------------
 
 
-def test_a_locked_joint_has_no_number_in_q_and_no_column() -> None:
-    done = urdfkin(
-        "jacobian", "panda", "--lock", "panda_finger_joint1=40mm", "--q", "ready", "--format", "json"
-    )
+def test_locked_joints_have_no_number_and_no_column_also_in_a_replay() -> None:
+    done = urdfkin("jacobian panda --lock panda_finger_joint1=40mm --q ready --format json")
     robot = library.load("panda", lock={"panda_finger_joint1": 0.04})
     assert done.code == 0, done.err
     assert done.data["result"] == [robot.jacobian("ready").tolist()]
     assert done.data["rates"] == list(robot.rate_names)
     assert done.data["lock"] == {"panda_finger_joint1": 0.04}
-
-
-def test_all_but_the_named_joints_are_locked_at_a_pose_and_single_values() -> None:
     words = ("--joints", "panda_joint1, panda_joint2", "--lock", "ready", "--lock", "panda_joint7=30deg")
-    found = urdfkin("placement", "panda", *words, "--q", "0.1,0.2", "--format", "json").data
+    found = urdfkin("placement panda", *words, "--q", "0.1,0.2", "--format", "json").data
     robot = library.load("panda").locked("ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"])
     assert found["result"] == [robot.placement([0.1, 0.2]).tolist()]
+    robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
+    words = robot.origin.words.split()
+    assert words == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
+    found = urdfkin("placement", *words, "--q", "ready", "--format", "json").data
+    assert found["result"] == [robot.placement("ready").tolist()]
 
 
 @pytest.mark.parametrize(
@@ -395,33 +366,27 @@ def test_all_but_the_named_joints_are_locked_at_a_pose_and_single_values() -> No
     ],
 )
 def test_every_command_with_one_robot_can_lock_joints(words: tuple[str, ...]) -> None:
-    done = urdfkin(*words, "--lock", "panda_finger_joint1=0.04", "--joints", "panda_joint4,panda_joint5")
-    assert done.code == 0, done.err
+    done = good(*words, "--lock", "panda_finger_joint1=0.04", "--joints", "panda_joint4,panda_joint5")
     assert "panda_joint3" not in done.text or "locked" in done.text
 
 
-def test_a_replay_of_a_locked_robot_locks_the_same_joints() -> None:
-    robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
-    words = robot.origin.words.split()
-    assert words == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
-    found = urdfkin("placement", *words, "--q", "ready", "--format", "json").data
-    assert found["result"] == [robot.placement("ready").tolist()]
+# -- by name, in degrees, as a pose ----------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--lock", "elbow=1"), "unknown coordinate 'elbow'"),
-        (("--lock", "panda_joint1=200deg"), "3.49066 is outside [-2.8973, 2.8973]"),
-        (("--lock", "panda_joint1=90"), "degrees? write 90deg"),
-        (("--lock", "panda_finger_joint2=0.01"), "it mimics panda_finger_joint1"),
-        (("--lock", "0.4"), "give each number with its name"),
-        (("--joints", "elbow"), "unknown coordinate 'elbow'"),
-        (("--joints", "panda_joint1"), "--lock panda_joint4=VALUE"),
-    ],
-)
-def test_a_wrong_lock_is_one_clear_error(words: tuple[str, ...], message: str) -> None:
-    done = urdfkin("info", "panda", *words)
-    assert done.code == 2
-    assert message in done.err
-    assert done.err.count("\n") == 1
+NAMED = "panda_joint1=30deg,panda_joint4=-pi/2,panda_joint6=1.5"
+RADIANS = [math.pi / 6, -0.785398, 0.0, -math.pi / 2, 0.0, 1.5, 0.785398, 0.001]
+
+
+@pytest.mark.slow
+def test_every_command_that_takes_q_reads_it_so(tmp_path: Path) -> None:
+    q = "shoulder_pan_joint=30deg, shoulder_lift_joint=-90deg, elbow_joint=90deg, wrist_1_joint=0,"
+    q += "wrist_2_joint=pi/2 , wrist_3_joint=0"
+    at = library.load("ur5").placement(q, "tool0")[:3, 3]
+    for command in ("imu", "singular-values"):
+        done = urdfkin(command, "ur5", "--q", q, "--format", "json")
+        assert (done.code, done.data["q"][0][0]) == (0, math.pi / 6)
+    picture = tmp_path / "way.svg"
+    done = urdfkin("plot ur5 --to raedy -o", str(picture))
+    assert "error: --to: unknown pose 'raedy'; did you mean ready?" in done.err
+    assert urdfkin("plot ur5 --from ready --to", q, "--panel", "position", "-o", str(picture)).code == 0
+    assert ", ".join(f"{x:.3g}" for x in np.round(at, 9)) in picture.read_text()

@@ -1,7 +1,5 @@
 """What is compiled is said, once and by its name, and nothing is compiled for input that cannot be used."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import NoReturn
@@ -49,15 +47,15 @@ def test_only_what_is_needed_is_compiled_and_it_is_said_once(tmp_path: Path) -> 
     assert "compil" not in process(*words, XDG_CACHE_HOME=str(tmp_path)).err
 
 
-def test_warm_compiles_everything_and_then_nothing() -> None:
+def test_warm_compiles_everything_and_then_nothing_is_started_to_compile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert urdfkin("warm").code == 0
     done = urdfkin("warm")
     assert (done.code, done.err) == (0, "")
     assert done.text.startswith("all ")
     assert "kernels are compiled: " in done.text
 
-
-def test_nothing_is_started_to_compile_kernels_that_are_on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object, **__: object) -> NoReturn:
         pytest.fail("a process was started")
 

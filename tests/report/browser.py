@@ -112,6 +112,10 @@ class Browser:
         """Until a function's body returns something true."""
         WebDriverWait(self.chrome, 60).until(lambda _: self.js(code))
 
+    def wait_for(self, words: str) -> None:
+        """Until the words stand on the page."""
+        WebDriverWait(self.chrome, 60).until(lambda _: words in self.js("return document.body.innerText"))
+
     def screenshot(self, name: str) -> None:
         """Keep a picture among the artefacts."""
         ARTEFACTS.mkdir(exist_ok=True)

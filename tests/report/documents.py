@@ -1,13 +1,12 @@
 """Reports to test with: real runs on a few robots, one of them hostile, and runs that went wrong."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math
 from functools import cache
 from typing import cast
 
+from tests.urdfs import joint, limit, robot
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Check, Document
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, percentile
@@ -17,26 +16,11 @@ HOSTILE_ROBOT = "<script>window.hacked=1</script>"
 HOSTILE_JOINT = "j\"'><img src=x onerror=window.hacked=1>"
 HOSTILE_LINK = "</script><script>window.hacked=1</script>&amp;{{7*7}}`|*\u2028"
 
-_ESCAPED = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
-
-
-def _attribute(name: str) -> str:
-    return "".join(_ESCAPED.get(letter, letter) for letter in name)
-
-
-HOSTILE_URDF = f"""<?xml version="1.0"?>
-<robot name="{_attribute(HOSTILE_ROBOT)}">
-  <link name="base"/><link name="{_attribute(HOSTILE_LINK)}"/><link name="tip"/>
-  <joint name="{_attribute(HOSTILE_JOINT)}" type="revolute">
-    <parent link="base"/><child link="{_attribute(HOSTILE_LINK)}"/>
-    <origin xyz="0 0 0.4"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
-  </joint>
-  <joint name="slide" type="prismatic">
-    <parent link="{_attribute(HOSTILE_LINK)}"/><child link="tip"/>
-    <origin xyz="0.3 0 0"/><axis xyz="1 0 0"/><limit lower="0" upper="0.5" effort="1" velocity="1"/>
-  </joint>
-</robot>
-"""
+HOSTILE_URDF = robot(
+    joint(HOSTILE_JOINT, "revolute", "base", HOSTILE_LINK, 'xyz="0 0 0.4"', "0 1 0", limit()),
+    joint("slide", "prismatic", HOSTILE_LINK, "tip", 'xyz="0.3 0 0"', "1 0 0", limit(0, 0.5)),
+    name=HOSTILE_ROBOT,
+)
 
 
 @cache

@@ -1,7 +1,5 @@
 """Pages as axe, the keyboard and paper find them; `scripts/audit_pages.py` tries more pages and screens."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The page in a real browser: it loads alone, draws, moves, sorts, filters, changes its theme, is safe."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.report.browser import Browser, opened
+from tests.report.browser import Browser, opened, require_chromium
 from tests.report.documents import arms, failing, hostile
 from urdfkin.report import html
 from urdfkin.report.html import as_html
@@ -54,21 +52,18 @@ def browser(desk: Browser, pages: dict[str, Path]) -> Browser:
     return desk
 
 
-def test_the_page_loads_without_errors_and_asks_for_nothing_but_itself(
+def test_the_page_loads_without_errors_draws_a_robot_and_asks_for_nothing_but_itself(
     browser: Browser, pages: dict[str, Path]
 ) -> None:
     asked = [url for url in browser.requests() if not url.startswith("data:")]
     assert asked == [pages["arms"].as_uri()]
     assert browser.errors() == []
-
-
-def test_the_view_draws_a_robot_on_part_of_its_canvas(browser: Browser) -> None:
     drawn, _, whole = browser.probe("pixels")
     assert 0.01 * whole < drawn < 0.9 * whole
     assert min(browser.probe("colours")) > 200  # joints and bones
 
 
-def test_a_slider_moves_the_robot_and_neutral_brings_it_back(browser: Browser) -> None:
+def test_a_slider_and_the_keyboard_move_the_view_and_neutral_brings_it_back(browser: Browser) -> None:
     before = browser.probe("pixels")
     assert browser.probe("slide", 1, 1.2) == "68.8°"
     browser.settle()
@@ -76,6 +71,10 @@ def test_a_slider_moves_the_robot_and_neutral_brings_it_back(browser: Browser) -
     browser.js("document.querySelector('[data-do=neutral]').click()")
     browser.settle()
     assert browser.probe("pixels") == before
+    before = browser.probe("pixels")
+    browser.probe("press", "ArrowLeft")
+    browser.settle()
+    assert browser.probe("pixels")[1] != before[1]
 
 
 def test_every_slider_has_its_joints_name_and_limits(browser: Browser) -> None:
@@ -119,13 +118,6 @@ def test_a_phone_shows_verdict_and_share_of_the_bound_beside_the_name(
     screen.screenshot("report-390")
 
 
-def test_the_keyboard_turns_the_view(browser: Browser) -> None:
-    before = browser.probe("pixels")
-    browser.probe("press", "ArrowLeft")
-    browser.settle()
-    assert browser.probe("pixels")[1] != before[1]
-
-
 def test_the_tables_frames_can_be_shown_in_both_conventions(browser: Browser) -> None:
     plain, shown = browser.probe("pixels")[1], []
     for convention in ("standard", "modified"):
@@ -156,7 +148,7 @@ def test_links_and_tables_are_drawn_where_the_robot_has_them(
             np.testing.assert_allclose(np.reshape(drawn, (4, 4)), expected, atol=1e-5)
 
 
-def test_the_overview_sorts_both_ways(browser: Browser) -> None:
+def test_the_overview_sorts_both_ways_filters_rows_and_leads_to_robots(browser: Browser) -> None:
     results = browser.probe("heads").index("results")
     for order in ("descending", "ascending"):
         assert browser.probe("sortBy", results) == order
@@ -167,14 +159,8 @@ def test_the_overview_sorts_both_ways(browser: Browser) -> None:
     assert browser.probe("column", 0) == ["panda", "ur5"]
     browser.probe("sortBy", 0)
     assert browser.probe("column", 0) == ["ur5", "panda"]
-
-
-def test_the_overview_filters_rows_and_robots(browser: Browser) -> None:
     assert browser.probe("find", "UR") == ["1 of 2", [True, False]]
     assert browser.probe("find", "") == ["2 of 2", [False, False]]
-
-
-def test_a_link_unfolds_its_robot(browser: Browser) -> None:
     browser.js("document.querySelectorAll('#overview a')[1].click()")
     browser.settle()
     assert browser.js("return document.querySelector('#robot-1').open")
@@ -194,7 +180,7 @@ def test_the_theme_goes_round_and_colours_the_page_and_the_view(browser: Browser
     assert browser.js(paper) == seen[0][1]
 
 
-def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path]) -> None:
+def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path], fleet: Path) -> None:
     desk.open(pages["hostile"])
     desk.probe("unfoldAll")
     desk.settle()
@@ -203,6 +189,11 @@ def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path]) -> N
     assert desk.errors() == []
     assert desk.js("return document.querySelector('details.robot h2').textContent").startswith("<script>")
     desk.screenshot("report-hostile")
+    desk.open(fleet)  # in a file beside the page
+    desk.js("document.querySelector('#robot-7').open = true")
+    desk.wait("return !!document.querySelector('#robot-7 table.checks')")
+    assert desk.js("return window.hacked") is None
+    assert desk.js("return document.querySelectorAll('img').length") == 0
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
@@ -322,14 +313,6 @@ def test_a_link_to_findings_loads_the_robots_file_and_shows_them(desk: Browser, 
     )
 
 
-def test_a_hostile_name_in_a_file_beside_the_page_does_nothing(desk: Browser, fleet: Path) -> None:
-    desk.open(fleet)
-    desk.js("document.querySelector('#robot-7').open = true")
-    desk.wait("return !!document.querySelector('#robot-7 table.checks')")
-    assert desk.js("return window.hacked") is None
-    assert desk.js("return document.querySelectorAll('img').length") == 0
-
-
 @pytest.mark.parametrize(
     ("change", "said"), [("gone", "is not there"), ("other", "belongs to another report")]
 )
@@ -350,3 +333,24 @@ def test_a_file_that_is_gone_or_another_reports_is_said(
     finally:
         file.write_text(text, encoding="utf-8")
     desk.errors()
+
+
+# -- a robot in a notebook's cell ------------------------------------------------------------------
+
+
+def test_a_robot_in_a_cell_is_drawn_where_it_was_put_and_asks_for_nothing(tmp_path: Path) -> None:
+    require_chromium()
+    cell = urdfkin.load("panda", verify=False).view("ready, panda_joint1=30deg")
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f'<!doctype html><meta charset="utf-8"><body>{cell._repr_html_()}', encoding="utf-8")
+    with opened(tmp_path / "profile") as browser:
+        browser.open(notebook)
+        browser.chrome.switch_to.frame(0)
+        browser.wait("return Number(document.querySelector('canvas').dataset.drawn || 0) > 0")
+        outputs = browser.js(
+            "return [...document.querySelectorAll('.sliders output')].map((o) => o.textContent)"
+        )
+        assert outputs == ["30.0°", "-45.0°", "0.0°", "-135.0°", "0.0°", "90.0°", "45.0°", "0.0010 m"]
+        browser.screenshot("cell")
+        assert browser.errors() == []
+        assert [url for url in browser.requests() if url.startswith(("http", "ws"))] == []

@@ -1,9 +1,9 @@
 """A comparison finds every kind of change, and calls a regression what is one and nothing else."""
 
-from __future__ import annotations
-
+import copy
 import math
-from collections.abc import Callable
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 import pytest
@@ -16,91 +16,82 @@ def words(old: Any, new: Any, **how: Any) -> list[tuple[bool, str]]:
     return [(change.regression, str(change)) for change in compare(old, new, **how).changes]
 
 
-def test_a_report_equals_itself() -> None:
+def test_a_report_equals_itself_and_a_robot_is_known_again_in_one_file_of_another_name() -> None:
     assert compare(arms(), arms()).changes == ()
-
-
-def _drop_robot(d: Any) -> None:
-    del d["robots"][1]
-
-
-def _fail(d: Any) -> None:
-    d["robots"][0]["checks"][0]["failed"] = 2
-
-
-def _forget_quantity(d: Any) -> None:
-    del d["robots"][0]["checks"][0]
-
-
-def _fewer_results(d: Any) -> None:
-    d["robots"][0]["checks"][0]["results"] -= 1
-
-
-def _worse(d: Any) -> None:
-    d["robots"][0]["checks"][0]["worst"] = 100.0
-
-
-def _beyond_numbers(d: Any) -> None:
-    d["robots"][0]["checks"][0]["worst"] = None
-
-
-def _verdict(d: Any) -> None:
-    d["robots"][0]["verdict"] = "not verified"
-
-
-def _interrupt(d: Any) -> None:
-    d["interrupted"] = True
-
-
-def test_a_robot_is_known_again_in_a_file_of_another_name() -> None:
     moved = arms()
     moved["robots"][1]["source"] = "models/ur5_v2.urdf"
     assert words(arms(), moved) == [(False, "ur5: file: ur5 -> models/ur5_v2.urdf")]
-
-
-def test_of_two_new_files_that_call_their_robot_alike_none_is_taken_for_the_old_one() -> None:
     doubled = arms()
     ur5 = doubled["robots"].pop(1)
     doubled["robots"] += [ur5 | {"source": "first.urdf"}, ur5 | {"source": "second.urdf"}]
     assert (True, "ur5: robot: verified -> nothing") in words(arms(), doubled)
 
 
-WORSE: list[tuple[Callable[[Any], None], str]] = [
-    (_drop_robot, "ur5: robot: verified -> nothing"),
-    (_fail, "panda: placement: 0 outside the bound -> 2 outside the bound"),
-    (_forget_quantity, "panda: placement: compared -> nothing"),
-    (_fewer_results, "panda: placement: 225 results -> 224 results"),
-    (_worse, "-> 100.00 eps*scale"),
-    (_beyond_numbers, "-> inf eps*scale"),
-    (_verdict, "panda: verdict: verified -> not verified"),
-    (_interrupt, "run: finished -> interrupted"),
-]
+#: What changed: its place in the document, its new value (none: it is gone), and what is said.
+WORSE: dict[str, tuple[tuple[Any, ...], Any, str]] = {
+    "a robot is gone": (("robots", 1), None, "ur5: robot: verified -> nothing"),
+    "failures": (
+        ("robots", 0, "checks", 0, "failed"),
+        2,
+        "placement: 0 outside the bound -> 2 outside the bound",
+    ),
+    "a quantity is gone": (("robots", 0, "checks", 0), None, "panda: placement: compared -> nothing"),
+    "fewer results": (("robots", 0, "checks", 0, "results"), 224, "placement: 225 results -> 224 results"),
+    "more": (("robots", 0, "checks", 0, "worst"), 100.0, "-> 100.00 eps*scale"),
+    "beyond numbers": (("robots", 0, "checks", 0, "worst"), "no number", "-> inf eps*scale"),
+    "a verdict": (("robots", 0, "verdict"), "not verified", "panda: verdict: verified -> not verified"),
+    "an interrupt": (("interrupted",), True, "run: finished -> interrupted"),
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("spoil", "line"), WORSE, ids=[spoil.__name__ for spoil, _ in WORSE])
-def test_what_got_worse_is_a_regression_and_its_return_is_not(
-    spoil: Callable[[Any], None], line: str
-) -> None:
-    spoiled = arms()
-    spoil(spoiled)
+@pytest.mark.parametrize("what", WORSE)
+def test_what_got_worse_is_a_regression_and_its_return_is_not(what: str) -> None:
+    (*path, key), value, line = WORSE[what]
+    spoiled: Any = arms()
+    home = reduce(getitem, path, spoiled)
+    if value is None:
+        del home[key]
+    else:
+        home[key] = None if value == "no number" else value
     there = compare(arms(), spoiled)
     assert there.exit_code == 1
     assert any(change.regression and line in str(change) for change in there.changes), words(arms(), spoiled)
     back = compare(spoiled, arms())
     assert back.exit_code == 0
-    assert len(back.changes) >= (0 if spoil is _fewer_results else 1)
+    assert len(back.changes) >= (what != "fewer results")
 
 
-def test_a_run_that_passed_and_does_not_is_a_regression_with_the_reason() -> None:
+#: The worst disagreement before and after, the factor that is allowed, and whether that is a regression.
+GROWTH = [
+    (10.0, 19.9, 2.0, False), (10.0, 20.0, 2.0, False), (10.0, 20.1, 2.0, True), (3.0, 6.1, 3.0, False),
+    (0.1, 1.9, 2.0, False), (0.1, 2.1, 2.0, True),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("before", "after", "factor", "regression"), GROWTH)
+def test_growth_counts_from_the_factor_on_and_above_a_single_rounding(
+    before: float, after: float, factor: float, regression: bool
+) -> None:
+    old, new = arms(), arms()
+    old["robots"][0]["checks"][0]["worst"] = before
+    new["robots"][0]["checks"][0]["worst"] = after
+    assert compare(old, new, factor).exit_code == int(regression)
+
+
+def test_a_run_that_passed_and_does_not_and_fewer_samples_are_regressions() -> None:
     new = arms()
     new["asked"] = 3
     line = "outcome: passed -> not passed, 1 of 3 robots without a report"
     assert (True, line) in words(arms(), new)
     assert compare(new, arms()).exit_code == 0
+    new = arms()
+    new["samples"] = 2
+    assert (True, "samples: 6 -> 2") in words(arms(), new)
+    assert (False, "samples: 2 -> 6") in words(new, arms())
 
 
-def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regression() -> None:
+def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_however_little_it_is() -> None:
     new: Any = arms()
     joint = new["robots"][1]["model"]["joints"][2]
     axis = joint["axis"]
@@ -115,9 +106,6 @@ def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_and_is_no_regressio
     assert changed[start + "axis"].new == "-z, rotated by 3.142 rad"
     assert changed[start + "origin"].new.endswith(": moved by 250 mm, rotated by 0 rad")
     assert changed[start + "upper limit"].new == "1.5"
-
-
-def test_a_change_too_small_for_the_words_of_a_pose_is_told_by_how_far_it_is() -> None:
     new: Any = arms()
     joint = new["robots"][1]["model"]["joints"][2]
     joint["placement"][2][3] += 1e-11
@@ -127,7 +115,7 @@ def test_a_change_too_small_for_the_words_of_a_pose_is_told_by_how_far_it_is() -
     assert told["axis"].endswith("rotated by 10 prad")
 
 
-def test_a_joint_that_follows_another_way_is_told_as_a_rule() -> None:
+def test_a_joint_that_follows_another_way_is_gone_or_new_is_told() -> None:
     old: Any = arms()
     new: Any = arms()
     for document, mimic in ((old, None), (new, {"leader": "wheel", "multiplier": -2.0, "offset": 0.25})):
@@ -135,9 +123,6 @@ def test_a_joint_that_follows_another_way_is_told_as_a_rule() -> None:
     (told,) = model_changes(old["robots"][1]["model"], new["robots"][1]["model"])
     assert told[0].endswith(", mimic rule")
     assert told[1:] == ("none", "-2 * wheel +0.25")
-
-
-def test_a_joint_that_is_gone_or_new_is_told_by_its_name() -> None:
     old: Any = arms()
     new: Any = arms()
     new["robots"][1]["model"]["joints"][2]["name"] = "other"
@@ -147,7 +132,7 @@ def test_a_joint_that_is_gone_or_new_is_told_by_its_name() -> None:
     assert (False, "ur5: joint other: nothing -> revolute") in lines
 
 
-def test_a_bound_that_is_wider_for_the_same_joints_is_a_regression() -> None:
+def test_a_wider_bound_and_tables_that_are_compared_no_more_are_regressions() -> None:
     new: Any = arms()
     check = new["robots"][0]["checks"][1]
     check["bound"][1] *= 3.0
@@ -159,9 +144,6 @@ def test_a_bound_that_is_wider_for_the_same_joints_is_a_regression() -> None:
     assert compare(new, arms()).exit_code == 0
     new["robots"][0]["joints"].append("another")
     assert not any("bound" in str(change) for change in compare(arms(), new).regressions)
-
-
-def test_tables_that_are_compared_no_more_are_a_regression() -> None:
     new = arms()
     chain = new["robots"][0]["chains"][0]
     chain["samples"] = 0
@@ -199,42 +181,49 @@ def test_versions_settings_and_new_robots_are_changes_and_no_regressions() -> No
     assert compare(old, new).exit_code == 0
 
 
-def test_fewer_samples_are_a_regression_and_more_are_none() -> None:
-    new = arms()
-    new["samples"] = 2
-    assert (True, "samples: 6 -> 2") in words(arms(), new)
-    assert (False, "samples: 2 -> 6") in words(new, arms())
-
-
-def test_growth_counts_from_the_factor_on_and_above_a_single_rounding() -> None:
-    old, new = arms(), arms()
-    for worst_old, worst_new, factor, regression in (
-        (3.0, 5.9, 2.0, False),
-        (3.0, 6.1, 2.0, True),
-        (3.0, 6.1, 3.0, False),
-        (0.1, 1.9, 2.0, False),
-        (0.1, 2.1, 2.0, True),
-    ):
-        old["robots"][0]["checks"][0]["worst"] = worst_old
-        new["robots"][0]["checks"][0]["worst"] = worst_new
-        assert bool(compare(old, new, factor).regressions) is regression, (worst_old, worst_new, factor)
-
-
-def test_findings_are_counted_by_code() -> None:
-    new = arms()
-    new["robots"][0]["findings"].append(
-        {
-            "code": "URDF999", "severity": "warning", "message": "m", "found": None, "remedy": None,
-            "file": "f", "line": 1, "column": 1, "element": None, "name": None, "oracle": None, "also": [7],
-        }
-    )  # fmt: skip
-    assert (False, "panda: warning URDF999: nothing -> 2") in words(arms(), new)
-
-
-def test_the_markdown_leads_with_regressions_and_fits_a_comment() -> None:
+def test_the_markdown_leads_with_regressions_and_counts_what_does_not_fit() -> None:
     found = compare(arms(), failing())
     markdown = markdown_of(arms(), failing(), found)
     lines = [line for line in markdown.splitlines() if "→" in line or line.startswith("| ")]
     assert markdown.startswith("## ❌ ")
+    same = compare(arms(), arms())
+    assert markdown_of(arms(), arms(), same).startswith("## ✅ No regression, 0 changes\n")
     assert "❌ regression" in lines[lines.index("| --- | --- | --- | --- |") + 1]
     assert len(markdown_of(arms(), failing(), found, limit=900)) <= 900
+    old: Any = arms()
+    new = copy.deepcopy(old)
+    for check in new["robots"][0]["checks"]:
+        check["failed"] = 2
+    found = compare(old, new)
+    whole = markdown_of(old, new, found)
+    room = len(whole) + 100  # what is kept free for the last line
+    assert markdown_of(old, new, found, room) == whole
+    assert markdown_of(old, new, found, room - 1).endswith(
+        "\n1 further change left out: the comment is full.\n"
+    )
+    assert len(markdown_of(old, new, found, room - 1)) <= room - 1
+
+
+def test_robots_that_were_given_several_times_are_told_apart_by_number() -> None:
+    old: Any = arms()
+    old["robots"] = [copy.deepcopy(old["robots"][1]) for _ in range(4)]
+    for place, name in enumerate(["ur5", "ur5 (2)", "ur5 (3)", "ur5 (4)"]):
+        new = copy.deepcopy(old)
+        new["robots"][place]["checks"][0]["results"] -= 1
+        (line,) = (line for _, line in words(old, new) if "results" in line)
+        assert line.startswith(f"{name}: ")
+
+
+@pytest.mark.parametrize(("before", "after"), [(0, 1), (1, 0), (1, 3), (2, 1), (2, 2), (0, 0)])
+def test_findings_of_one_code_are_counted_with_their_other_places_and_notes_are_not(
+    before: int, after: int
+) -> None:
+    old: Any = arms()
+    new = copy.deepcopy(old)
+    finding = {"code": "URDF999", "severity": "warning", "also": []}
+    note = {"code": "URDF998", "severity": "note", "also": []}
+    old["robots"][0]["findings"] = [finding] * before
+    new["robots"][0]["findings"] = [finding | {"also": list(range(after - 1))}] * bool(after) + [note]
+    found = [line for _, line in words(old, new) if "URDF99" in line]
+    expected = f"panda: warning URDF999: {before or 'nothing'} -> {after or 'nothing'}"
+    assert found == ([] if before == after else [expected])

@@ -1,15 +1,13 @@
 """The history of several reports: its order, its robots, its changes, and the files that cannot be used."""
 
-from __future__ import annotations
-
 import json
 import os
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
-from tests.cli.running import urdfkin
+from tests.cli.running import good, refused, urdfkin
+from tests.markup import Page
 from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile, months_runs, run_on
 from urdfkin.errors import InputError
 from urdfkin.report import history as module
@@ -31,11 +29,16 @@ def month(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_runs_are_ordered_by_their_start_and_not_by_the_names_of_files(month: Path) -> None:
+def test_runs_are_ordered_by_their_start_and_a_copy_is_counted_once(month: Path) -> None:
     found = history([month])
     assert [run["started"][8:10] for run in found.runs] == [f"{day:02}" for day in range(1, 9)]
     assert [Path(run["file"]).stem for run in found.runs] == list("76543210")
     assert [run["verdict"] for run in found.runs] == ["verified"] * 4 + ["disagrees"] + ["verified"] * 3
+    put(month / "latest.json", months_runs()[-1])
+    found = history([month])
+    assert len(found.runs) == 8
+    assert [one["reason"] for one in found.repeated] == [f"the same run as {month / '0.json'}"]
+    assert found.exit_code == 0
 
 
 def test_each_robot_has_a_point_for_each_run_that_has_it(month: Path) -> None:
@@ -60,45 +63,19 @@ def test_changes_name_their_run_and_regressions_come_first(month: Path) -> None:
     assert [run for run, *_ in told] == sorted((run for run, *_ in told), reverse=True)
 
 
-def test_a_terminal_shows_runs_robots_changes_and_the_latest_verdict(month: Path) -> None:
-    done = urdfkin("report", "history", str(month))
-    assert done.code == 0
+def test_a_terminal_shows_runs_robots_and_changes_the_latest_only_unless_all_are_asked_for(
+    month: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = good("report history", str(month))
     assert "run 5, REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert "panda        ✓✓✓✓✗✓✓✓  verified" in done.text
     assert done.text.splitlines()[-1] == "8 runs; latest verdict: verified, as in the 2 runs before"
-
-
-def test_only_the_latest_runs_and_changes_are_shown_unless_all_are_asked_for(
-    month: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr(module, "SHOWN", 3)
     found = history([month])
     some, everything = document(found).text(), document(found, all_=True).text()
     assert "13 more: --all shows them" in some
     assert ("2026-11-05" in some, "2026-11-05" in everything) == (False, True)
     assert "more: --all" not in everything
-
-
-def test_a_broken_file_is_named_and_the_rest_is_shown(month: Path) -> None:
-    (month / "broken.json").write_text(json.dumps(arms())[:500])
-    (month / "other.json").write_text('{"schema": "other/1"}')
-    edited = arms()
-    edited["robots"][0]["failed"] = 7
-    put(month / "edited.json", edited)
-    done = urdfkin("report", "history", str(month))
-    assert done.code == 2
-    assert f"not used: {month / 'broken.json'}: not a JSON file" in done.text
-    assert f"not used: {month / 'other.json'}: not a file with the layout urdfkin-validation/1" in done.text
-    assert f"not used: {month / 'edited.json'}: the report contradicts itself" in done.text
-    assert "8 runs;" in done.text
-
-
-def test_a_copy_of_a_report_is_counted_once(month: Path) -> None:
-    put(month / "latest.json", months_runs()[-1])
-    found = history([month])
-    assert len(found.runs) == 8
-    assert [one["reason"] for one in found.repeated] == [f"the same run as {month / '0.json'}"]
-    assert found.exit_code == 0
 
 
 def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> None:
@@ -122,17 +99,26 @@ def test_a_store_is_a_run(tmp_path: Path) -> None:
     assert found.exit_code == 0
 
 
-def test_a_pipe_in_a_folder_is_named_and_not_waited_for(month: Path) -> None:
+def test_a_broken_file_or_a_pipe_is_named_and_the_rest_is_shown(month: Path) -> None:
     os.mkfifo(month / "pipe.json")
     found = history([month])
     assert [(Path(one["file"]).name, one["reason"][:18]) for one in found.unusable] == [
         ("pipe.json", "not a regular file")
     ]
+    (month / "broken.json").write_text(json.dumps(arms())[:500])
+    (month / "other.json").write_text('{"schema": "other/1"}')
+    edited = arms()
+    edited["robots"][0]["failed"] = 7
+    put(month / "edited.json", edited)
+    done = urdfkin("report history", str(month))
+    assert done.code == 2
+    assert f"not used: {month / 'broken.json'}: not a JSON file" in done.text
+    assert f"not used: {month / 'other.json'}: not a file with the layout urdfkin-validation/1" in done.text
+    assert f"not used: {month / 'edited.json'}: the report contradicts itself" in done.text
+    assert "8 runs;" in done.text
 
 
-def test_the_numbers_of_reports_and_of_files_in_a_folder_have_limits(
-    month: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_numbers_and_sizes_of_reports_have_limits(month: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_FILES", 7)
     with pytest.raises(InputError, match="more than 7 files"):
         history([month])
@@ -140,42 +126,27 @@ def test_the_numbers_of_reports_and_of_files_in_a_folder_have_limits(
     monkeypatch.setattr(module, "MOST_RUNS", 7)
     with pytest.raises(InputError, match="more than 7 reports"):
         history([month])
-
-
-def test_a_file_beyond_the_limit_of_its_size_is_named(month: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
     monkeypatch.setattr(module, "MOST", 1000)
     with pytest.raises(InputError, match=r"no report to show: found .*too large"):
         history([month])
 
 
 def test_no_report_at_all_is_an_error_with_the_remedy(tmp_path: Path) -> None:
-    done = urdfkin("report", "history", str(tmp_path))
-    assert done.code == 2
-    assert "no report to show" in done.err
-    assert "urdfkin validate ROBOT --json FILE" in done.err
-    assert urdfkin("report", "history").code == 2
-
-
-class _Elements(HTMLParser):
-    """The tags of a page, and the addresses in it."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.tags, self.addresses = set[str](), list[str]()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        self.addresses += [value or "" for name, value in attrs if name in ("href", "src", "action")]
+    err = refused("report history", str(tmp_path))
+    assert "no report to show" in err
+    assert "urdfkin validate ROBOT --json FILE" in err
+    assert urdfkin("report history").code == 2
 
 
 def test_the_page_has_no_script_no_address_and_no_hostile_element(tmp_path: Path) -> None:
     reports = [run_on(1, hostile()), run_on(2, hostile())]
     reports[1]["robots"][1]["source"] = '"><img src=x onerror=hacked()>'
     page = as_html(history([put(tmp_path / f"{i}.json", one) for i, one in enumerate(reports)]), "<b>command")
-    elements = _Elements()
-    elements.feed(page)
-    assert elements.tags.isdisjoint({"script", "img", "iframe", "object", "form", "base"})
-    assert all(address.startswith(("#robot-", "data:,")) for address in elements.addresses)
+    elements = Page(page).elements
+    assert {tag for tag, _ in elements}.isdisjoint({"script", "img", "iframe", "object", "form", "base"})
+    addresses = [attributes.get(name) for _, attributes in elements for name in ("href", "src", "action")]
+    assert all((address or "#robot-").startswith(("#robot-", "data:,")) for address in addresses)
     assert HOSTILE_ROBOT not in page
     assert "&lt;script&gt;" in page
     assert "default-src &#39;none&#39;" in page or "default-src 'none'" in page
@@ -186,7 +157,7 @@ def test_the_page_is_written_by_its_suffix_and_follows_the_latest_verdict(tmp_pa
     pages = []
     for name, words in (("bad", [good, bad]), ("good", [good])):
         path = tmp_path / f"{name}.html"
-        assert urdfkin("report", "history", *map(str, words), "--output", str(path)).code == 0
+        assert urdfkin("report history", *map(str, words), "--output", str(path)).code == 0
         pages.append(path.read_text(encoding="utf-8"))
     assert '<div class="verdict bad">' in pages[0]
     assert "2 runs; latest verdict: disagrees, before: verified" in pages[0]

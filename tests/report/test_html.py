@@ -1,17 +1,15 @@
 """The page is whole in itself, says everything, escapes everything, and stays small."""
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import json
 import re
 from functools import cache
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
+from tests.markup import Page
 from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
 from urdfkin.report import html as html_module
 from urdfkin.report import pages
@@ -28,37 +26,12 @@ pytestmark = pytest.mark.slow
 ASSETS = Path(html_module.__file__).parent / "assets"
 
 
-class Page(HTMLParser):
-    """Elements, attributes, ids, and the text outside scripts and styles."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__(convert_charrefs=True)
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
-        self.scripts: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        inside = self.elements[-1][0] if self.elements else ""
-        (self.scripts if inside in ("script", "style") else self.words).append(data)
-
-    @property
-    def text(self) -> str:
-        return " ".join(" ".join(self.words).split())
-
-    def all(self, tag: str) -> list[dict[str, str | None]]:
-        return [attributes for name, attributes in self.elements if name == tag]
-
-
 @cache
 def page(name: str) -> Page:
     return Page(as_html({"arms": arms, "hostile": hostile, "failing": failing}[name]()))
 
 
-def test_nothing_on_the_page_refers_to_anywhere_else() -> None:
+def test_nothing_refers_to_anywhere_else_and_every_id_stands_once() -> None:
     for tag, attributes in page("arms").elements:
         for name in ("src", "href", "xlink:href", "action", "data", "poster", "srcset"):
             value = attributes.get(name)
@@ -71,9 +44,6 @@ def test_nothing_on_the_page_refers_to_anywhere_else() -> None:
     )
     assert policy is not None
     assert policy.startswith("default-src 'none'")
-
-
-def test_every_id_stands_once_and_every_reference_has_its_id() -> None:
     ids = [attributes["id"] for _, attributes in page("arms").elements if "id" in attributes]
     assert len(ids) == len(set(ids))
     for _, attributes in page("arms").elements:
@@ -103,13 +73,16 @@ def test_it_says_what_was_checked_by_which_versions_and_how_to_repeat_it() -> No
         assert words in text, words
 
 
-def test_what_failed_is_said_in_words_and_not_by_colour_alone() -> None:
+def test_what_failed_is_said_in_words_and_its_reason_comes_first() -> None:
     text = page("failing").text
     assert "Not verified against Pinocchio" in text
     assert "1 of 3 robots disagrees, 1 of 3 robots has bad input." in text
     assert "1 robot verified." in text
     assert "✗ 3" in text
     assert "URDF502" in text
+    computation, model = banner(failing())
+    assert "1 of 3 files unusable" in model
+    assert computation.index("bad input") < computation.index("results lie outside")
 
 
 def test_tables_agree_on_the_page_as_far_as_their_share_of_the_bound_allows() -> None:
@@ -154,17 +127,14 @@ def test_a_page_without_matplotlib_lacks_the_plots_and_says_so(monkeypatch: pyte
     assert 'class="plot"' not in text
 
 
-def test_the_same_document_gives_the_same_page() -> None:
+def test_the_same_document_gives_the_same_page_and_a_robot_costs_little() -> None:
     assert as_html(arms()) == as_html(arms())
-
-
-def test_a_robot_costs_little_beside_what_every_page_carries() -> None:
     two, one = arms(), arms()
     del one["robots"][0]
     assert len(as_html(two)) - len(as_html(one)) < 140_000
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_page_of_all_68_robots_is_at_most_10_megabytes() -> None:
     document = validate(examples(), samples=0).as_dict()
     assert len(document["robots"]) == 68
@@ -192,7 +162,7 @@ def test_the_bundled_library_is_the_one_that_was_built() -> None:
     assert f"three.js {named['dependencies']['three']}, MIT licence" in head
 
 
-def test_what_failed_comes_first_and_stands_open() -> None:
+def test_what_failed_comes_first_stands_open_and_has_the_line_that_computes_it_again() -> None:
     document = failing()
     page = as_html(document)
     heads = re.findall(r'<details class="robot" id="robot-(\d+)" data-verdict="([^"]*)"[^>]*?( open)?>', page)
@@ -202,21 +172,25 @@ def test_what_failed_comes_first_and_stands_open() -> None:
     assert all(bool(opened) == (verdict != "verified") for _, verdict, opened in heads)
     rows = re.findall(r'<tr data-verdict="([^"]*)"', page)
     assert rows == [verdict for _, verdict, _ in heads]
+    text = as_html(failing())
+    panda = text[text.index('data-verdict="disagrees"') :]
+    failures = panda.index("Results outside their bound")
+    assert failures < panda.index("Distributions against the bound")
+    assert failures < panda.index("urdfkin velocity panda --frame") < panda.index("<h3>Checks</h3>")
 
 
-def test_errors_are_not_counted_as_warnings() -> None:
+def test_one_configuration_joints_that_move_and_errors_are_counted_as_such() -> None:
     document = failing()
     robot = next(robot for robot in document["robots"] if robot["findings"])
     first = robot["findings"][0]
     robot["findings"] = [{**first, "severity": "error"}, {**first, "severity": "warning"}]
     assert pages.overview(robot, [])["findings"] == "1 error, 1 warning"
-
-
-def test_joints_that_move_are_counted_in_a_robot_that_was_not_compared() -> None:
     document = arms()
     robot = document["robots"][1]
     robot["verdict"], robot["checks"], robot["joints"], robot["results"] = "not verified", [], [], 0
     assert "6 of them move" in as_html(document)
+    text = as_html(arms() | {"samples": 1})
+    assert "1 random configuration for each robot" in text
 
 
 def test_the_heat_maps_colour_is_the_share_of_the_bound() -> None:
@@ -255,17 +229,6 @@ def test_the_banner_answers_for_the_computation_and_for_the_model() -> None:
     assert "Errors in 1 of 2 files 1 error, 2 warnings. Show the first" in banner(document)[1]
 
 
-def test_a_file_that_cannot_be_read_is_no_right_model_and_its_reason_comes_first() -> None:
-    computation, model = banner(failing())
-    assert "1 of 3 files unusable" in model
-    assert computation.index("bad input") < computation.index("results lie outside")
-
-
-def test_one_sample_is_one_configuration() -> None:
-    text = as_html(arms() | {"samples": 1})
-    assert "1 random configuration for each robot" in text
-
-
 def test_each_error_of_a_file_is_on_the_page_once(tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="a"/><joint name="j"/></robot>')
@@ -275,14 +238,6 @@ def test_each_error_of_a_file_is_on_the_page_once(tmp_path: Path) -> None:
     assert text.count("another link has this name") == 1
     document["robots"][0]["findings"] = []
     assert as_html(document).count("another link has this name") == 1
-
-
-def test_a_failure_comes_first_with_the_line_that_computes_it_again() -> None:
-    text = as_html(failing())
-    panda = text[text.index('data-verdict="disagrees"') :]
-    failures = panda.index("Results outside their bound")
-    assert failures < panda.index("Distributions against the bound")
-    assert failures < panda.index("urdfkin velocity panda --frame") < panda.index("<h3>Checks</h3>")
 
 
 def test_a_value_that_is_not_finite_has_a_mark_in_the_figure_and_colours_its_own_cell() -> None:

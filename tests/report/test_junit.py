@@ -1,7 +1,5 @@
 """JUnit XML keeps to the schema that Jenkins publishes and says everything in its bodies."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -50,12 +48,8 @@ def test_a_failure_says_everything_in_its_text() -> None:
     found, verdict = root.findall(".//failure")
     assert "disagrees: 3 of" in (verdict.text or "")
     text = found.text or ""
-    for words in (
-        "velocity, local of panda",
-        "outside their bound: 3",
-        "worst inf",
-        "replay: urdfkin velocity",
-    ):
+    told = "velocity, local of panda", "outside their bound: 3", "worst inf", "replay: urdfkin velocity"
+    for words in told:
         assert words in text
     assert root.get("failures") == "2"
 

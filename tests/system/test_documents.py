@@ -1,7 +1,5 @@
 """All documents share one header; their schemas are generated from types, which also judge what is read."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A worker that dies over one robot as a crash of compiled code would, as often as a file says."""
 
-from __future__ import annotations
-
 import os
 import signal
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A worker that raises over one robot what nobody foresaw: the error is named in the environment."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 

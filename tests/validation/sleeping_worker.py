@@ -1,7 +1,5 @@
 """A worker that hangs as compiled code does: it notices neither a signal that can be caught nor its pipe."""
 
-from __future__ import annotations
-
 import signal
 import time
 

@@ -1,7 +1,5 @@
 """A cluster computes what one process does, whoever is killed, and blames a robot and no neighbour."""
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import json
@@ -15,12 +13,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import dask
 import numpy as np
 import psutil
 import pytest
@@ -66,8 +66,6 @@ def two() -> Iterator[Cluster]:
 @pytest.fixture(scope="module")
 def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cluster, LocalCluster]]:
     """Two of Dask's worker processes, which can be killed, and the cluster that replaces them."""
-    import dask  # noqa: PLC0415
-
     folder = str(tmp_path_factory.mktemp("dask"))
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -138,8 +136,6 @@ def test_a_process_of_ours_takes_no_module_from_dasks_folder(
 def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobody_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import dask  # noqa: PLC0415
-
     page = (Path(__file__).parents[2] / "docs" / "campaigns.md").read_text("utf-8")
     make = re.search(r"^openssl req .*$", page, re.MULTILINE)
     settings = re.search(r"^```yaml\n(distributed:.*?)^```$", page, re.MULTILINE | re.DOTALL)
@@ -159,59 +155,27 @@ def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobo
         merged: dict[str, Any] = dask.config.merge(dask.config.config, mine)
         return merged
 
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
-        "DASK_CONFIG": str(config),
-    }
-    place, started = tmp_path / "scheduler.json", list[subprocess.Popen[bytes]]()
-
-    def start(role: str, *words: str) -> None:
-        command = [
-            sys.executable,
-            "-m",
-            f"distributed.cli.dask_{role}",
-            "--scheduler-file",
-            str(place),
-            *words,
-        ]
-        out = (tmp_path / f"{role}.txt").open("wb")
-        started.append(subprocess.Popen(command, env=environment, stdout=out, stderr=out))
-
-    try:
-        start("scheduler", "--port", "0", "--host", "127.0.0.1", "--no-dashboard")
-        words = (
+    with programs(tmp_path, DASK_CONFIG=str(config)) as start:
+        start("scheduler", "--port", "0", "--host", "127.0.0.1")
+        start(
+            "worker",
             "--host",
             "127.0.0.1",
             "--nthreads",
             "1",
-            "--no-dashboard",
+            "--no-nanny",
             "--local-directory",
             str(tmp_path),
         )
-        start("worker", "--no-nanny", *words)
-        address = _address(place)
+        address = _address(tmp_path)
         assert address.startswith("tls://127.0.0.1:")
-        with dask.config.set({"distributed.comm.timeouts.connect": "2s"}):
-            for other in (address, address.replace("tls", "tcp")):
-                with (
-                    pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
-                    connected(other),
-                ):
-                    pass
-            with (
-                dask.config.set(key_of(stranger)),
-                pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
-                connected(address),
-            ):
-                pass
+        for other in (address, address.replace("tls", "tcp")):
+            nobody_answers(other, 2)
+        with dask.config.set(key_of(stranger)):
+            nobody_answers(address, 2)
         with dask.config.set(key_of(tmp_path)), connected(address) as there:
             there._client.wait_for_workers(1, timeout=60)
             assert validate("planar_two_link", samples=SAMPLES, executor=there).passed
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
 
 
 def test_a_cluster_changes_no_number_and_sends_each_robot_once(
@@ -318,14 +282,46 @@ def _running(there: LocalCluster) -> list[int]:
     return [nanny.pid for nanny in there.workers.values() if nanny.status == Status.running]
 
 
-def _address(place: Path) -> str:
-    """Return the address of the scheduler that writes this file; it exists for a moment without content."""
+@contextmanager
+def programs(folder: Path, **env: str) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
+    """Dask's own programs, started by role and options, with a file for the address in the folder."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), **env}
+    started = list[subprocess.Popen[bytes]]()
+
+    def start(role: str, *words: str) -> subprocess.Popen[bytes]:
+        place = str(folder / "scheduler.json")
+        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", "--scheduler-file", place, *words]
+        out = (folder / f"{role}.txt").open("wb")
+        started.append(
+            subprocess.Popen([*command, "--no-dashboard"], env=environment, stdout=out, stderr=out)
+        )
+        return started[-1]
+
+    try:
+        yield start
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def _address(folder: Path) -> str:
+    """The address that the scheduler writes to its file, which exists for a moment without content."""
     deadline = time.monotonic() + 60
     while True:
         with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
-            return str(json.loads(place.read_text())["address"])
+            return str(json.loads((folder / "scheduler.json").read_text())["address"])
         assert time.monotonic() < deadline, "the scheduler wrote no address"
         time.sleep(0.1)
+
+
+def nobody_answers(address: str, seconds: float) -> None:
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": f"{seconds}s"}),
+        pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
+        connected(address),
+    ):
+        pass
 
 
 @cache
@@ -381,18 +377,11 @@ def test_a_local_cluster_has_a_number_of_workers(word: str) -> None:
 
 def test_a_client_that_finds_no_scheduler_is_deleted_at_once() -> None:
     """If the garbage collector deletes it in Dask's next thread, that thread waits for ever."""
-    import dask  # noqa: PLC0415
-
     gc.collect()
     before = _clients()
     gc.disable()
     try:
-        with (
-            dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
-            pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
-            connected("tcp://127.0.0.1:9"),
-        ):
-            pass
+        nobody_answers("tcp://127.0.0.1:9", 0.5)
         assert _clients() <= before
     finally:
         gc.enable()
@@ -402,43 +391,18 @@ def _clients() -> set[int]:
     return {id(thing) for thing in gc.get_objects() if type(thing) is Client}
 
 
-def test_where_nobody_answers_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    import dask  # noqa: PLC0415
-
-    with (
-        dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
-        pytest.raises(ClusterError, match="no Dask scheduler answers at this address"),
-        connected("tcp://127.0.0.1:9"),
-    ):
-        pass
-
-
 def test_a_lost_scheduler_loses_nothing_that_the_store_holds(undisturbed: str, tmp_path: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    place, started = tmp_path / "scheduler.json", list[subprocess.Popen[bytes]]()
-
-    def start(role: str, *words: str) -> None:
-        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", *words]
-        out = (tmp_path / f"{role}.txt").open("wb")
-        started.append(subprocess.Popen(command, env=environment, stdout=out, stderr=out))
-
-    how = ("--no-dashboard", "--scheduler-file", str(place))
-    start("scheduler", "--port", "0", "--host", "127.0.0.1", *how)
-    start("worker", "--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path), *how)
-    try:
-        address = _address(place)
+    with programs(tmp_path) as start:
+        scheduler = start("scheduler", "--port", "0", "--host", "127.0.0.1")
+        start("worker", "--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path))
 
         def killed(standing: CampaignProgress) -> None:
             if standing.chunks_done >= 3:
-                started[0].kill()
+                scheduler.kill()
 
-        with contextlib.suppress(Exception), connected(address) as there:
+        with contextlib.suppress(Exception), connected(_address(tmp_path)) as there:
             there._client.wait_for_workers(1, timeout=60)
             report = validate(ROBOTS, samples=SAMPLES, executor=there, store=tmp_path / "s", progress=killed)
-    finally:
-        for process in started:
-            process.kill()
-            process.wait()
     assert "connection to the scheduler is lost" in str(report.robots[-1].reason)
     assert "repeat the same command" in str(report.robots[-1].reason)
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path / "s")) == undisturbed

@@ -1,7 +1,5 @@
 """What the judge found is kept: it goes on where it was ended, and trusts no file."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -62,7 +60,7 @@ def test_it_goes_on_where_it_was_ended_and_the_report_is_that_of_one_run(
     judge.ends_at = "double_pendulum"
     assert urdfkin(*WORDS, "--store", store).code == 130
     assert stored(store).interrupted
-    assert "accuracy study: 1 of 2 robots" in urdfkin("report", "status", store).text
+    assert "accuracy study: 1 of 2 robots" in urdfkin("report status", store).text
     judge.ends_at = ""
     assert urdfkin(*WORDS, "--store", store, "--json", str(again)).code == 2  # of the robot that is none
     assert judge.asked == ["planar_two_link", "double_pendulum"]
@@ -98,14 +96,14 @@ def test_parts_judge_each_robot_once_and_merge_to_the_report_of_one_run(judge: J
     for shard, store in shards:
         urdfkin(*WORDS, "--store", store, "--shard", shard)
     assert judge.asked == ["planar_two_link", "double_pendulum"]
-    merged = urdfkin("report", "merge", whole, *(store for _, store in shards))
+    merged = urdfkin("report merge", whole, *(store for _, store in shards))
     assert "accuracy study: 2 of 2 robots" in merged.text
     urdfkin("report", whole, "--json", str(again))
     assert judged(again) == expected
     urdfkin(*WORDS[:-1], "2", "--store", shards[1][1], "--shard", "2/2")
-    refused = urdfkin("report", "merge", whole, *(store for _, store in shards))
-    assert refused.code == 2
-    assert "--judge-samples 2 --seed 0, and --judge-samples 1 --seed 0 in" in refused.err
+    again_merged = urdfkin("report merge", whole, *(store for _, store in shards))
+    assert again_merged.code == 2
+    assert "--judge-samples 2 --seed 0, and --judge-samples 1 --seed 0 in" in again_merged.err
 
 
 def test_a_damaged_judgement_is_told_and_made_again(judge: Judge, tmp_path: Path) -> None:

@@ -1,19 +1,27 @@
-"""A report tells what a robot is: its parts, findings, tables that were checked, and where time went."""
-
-from __future__ import annotations
+"""A report tells what a robot is, and the commands that it tells to type work."""
 
 import json
+import shlex
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good
+from tests.cli.running import urdfkin as command
+from tests.robots.odd_urdfs import urdf_of
+from tests.urdfs import joint, limit
+from tests.urdfs import robot as robot_of
 from urdfkin.dh import dh_table
+from urdfkin.robot import Robot
 from urdfkin.validation import robot_summary as chains_module
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_summary import MOST, chains_of
 from urdfkin.validation.timings import Clock, total
 from urdfkin.verify.pinocchio import PinocchioOracle
@@ -39,50 +47,10 @@ def test_another_robots_chains_are_its_leaves_one_for_each_set_of_joints() -> No
     assert all(chain["limb"] is None and chain["samples"] == 0 for chain in chains)
 
 
-def test_a_floating_root_has_no_table_and_no_trouble() -> None:
+def test_a_floating_root_has_no_table_and_time_is_told_by_whose_work_it_was() -> None:
     report = validate("ur5", samples=0, root_joint="floating")
     assert report.passed
     assert report.command == "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating"
-
-
-def test_a_wrong_table_fails_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = dh_table
-
-    def wrong(*args: str) -> object:
-        table = right(*args)  # type: ignore[arg-type]
-        return replace(table, tool=table.tool @ shifted)
-
-    shifted = np.eye(4)
-    shifted[0, 3] = 1e-9
-    monkeypatch.setattr(chains_module, "dh_table", wrong)
-    robot = validate("ur5", samples=0).robots[0]
-    assert robot.failed == 0
-    assert robot.verdict is Verdict.DISAGREES
-
-
-@pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_of_both_conventions_the_worse_table_is_told(
-    convention: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    robot, right = urdfkin.load("ur5"), dh_table
-    good: Any
-    (good,) = chains_of(robot, robot.verifier.oracle())
-
-    def wrong(*args: str) -> object:
-        table = right(*args)  # type: ignore[arg-type]
-        return replace(table, tool=table.tool @ shifted) if args[-1] == convention else table
-
-    shifted = np.eye(4)
-    shifted[0, 3] = 1e-9
-    monkeypatch.setattr(chains_module, "dh_table", wrong)
-    bad: Any
-    (bad,) = chains_of(robot, robot.verifier.oracle())
-    assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
-    assert bad["worst"] > 1e4 * good["worst"]
-    assert bad["share_of_bound"] > 1.0 > good["share_of_bound"]
-
-
-def test_time_is_told_by_whose_work_it_was() -> None:
     robot = validate("ur5", samples=10).robots[0]
     assert robot.clock is not None
     parts = robot.clock.as_dict()
@@ -90,6 +58,43 @@ def test_time_is_told_by_whose_work_it_was() -> None:
     np.testing.assert_allclose(sum(parts.values()), robot.seconds, rtol=0.02, atol=1e-3)
     both = total([Clock(1.0, 2.0, 3.0, 4.0), Clock(10.0, 20.0, 30.0, 40.0)])
     assert both == Clock(11.0, 22.0, 33.0, 44.0)
+
+
+@pytest.fixture
+def shift(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Shift the tips of the tables that are made from now on, or of those of a convention."""
+    shifted, right = np.eye(4), dh_table
+    shifted[0, 3] = 1e-9
+
+    def wrong_from_now_on(*conventions: str) -> None:
+        def wrong(*args: str) -> object:
+            table = right(*args)  # type: ignore[arg-type]
+            changed = replace(table, tool=table.tool @ shifted)
+            return changed if not conventions or args[-1] in conventions else table
+
+        monkeypatch.setattr(chains_module, "dh_table", wrong)
+
+    return wrong_from_now_on
+
+
+def test_a_wrong_table_fails_its_robot(shift: Callable[..., None]) -> None:
+    shift()
+    robot = validate("ur5", samples=0).robots[0]
+    assert robot.failed == 0
+    assert robot.verdict is Verdict.DISAGREES
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_of_both_conventions_the_worse_table_is_told(convention: str, shift: Callable[..., None]) -> None:
+    robot = urdfkin.load("ur5")
+    good: Any
+    (good,) = chains_of(robot, robot.verifier.oracle())
+    shift(convention)
+    bad: Any
+    (bad,) = chains_of(robot, robot.verifier.oracle())
+    assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
+    assert bad["worst"] > 1e4 * good["worst"]
+    assert bad["share_of_bound"] > 1.0 > good["share_of_bound"]
 
 
 def test_what_must_agree_exactly_and_does_not_can_still_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,3 +113,83 @@ def test_what_must_agree_exactly_and_does_not_can_still_be_written(monkeypatch: 
     assert check["worst"] is None
     assert check["share_of_bound"] is None
     assert check["failed"] == check["results"]
+
+
+# -- commands that repeat --------------------------------------------------------------------------
+
+
+#: A link is called as a joint elsewhere, so that a replay line has to say which it means.
+TEXT = robot_of(
+    joint("turn", "revolute", "base", "b", 'xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"', "0 1 1", limit()),
+    joint("slide", "prismatic", "b", "turn", 'xyz="0 0.7 0"', "1 2 0", limit()),
+)
+
+
+def replayed(report: RobotReport, stdin: str = "") -> int:
+    """Run every line of a robot's report; how many there were."""
+    lines = [line for key in report.tallies if (line := report.replay(key)) is not None]
+    for line in lines:
+        words = shlex.split(line)
+        assert words[0] == "urdfkin"
+        good(*words[1:], "--format", "json", stdin=stdin)
+    return len(lines)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+@pytest.mark.parametrize("root_joint", [None, "planar"])
+def test_every_line_of_a_text_works_with_the_text_on_standard_input(root_joint: str | None) -> None:
+    report = validate(TEXT, samples=2, root_joint=root_joint).robots[0]
+    assert report.source == "<text>"
+    assert replayed(report, TEXT) > 10
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_a_line_computes_the_joint_that_was_compared_and_not_the_link_of_its_name() -> None:
+    robot = urdfkin.load(TEXT)
+    report = validate(robot, samples=2).robots[0]
+    for (quantity, reference), tally in report.tallies.items():
+        line = report.replay((quantity, reference))
+        if quantity != "joint jacobian" or line is None or tally.case is None:
+            continue
+        done = command(*shlex.split(line)[1:], "--format", "json", stdin=TEXT)
+        expected = robot.jacobian(tally.case.q, f"joint:{tally.case.frame}", reference)
+        assert np.allclose(done.data["result"][0], expected, atol=1e-12)
+        return
+    pytest.fail("no joint was compared")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+@pytest.mark.parametrize("loaded", [False, True])
+def test_a_file_called_as_a_robot_of_the_catalogue_stays_a_file(
+    loaded: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("panda").write_text(TEXT, encoding="utf-8")
+    source: Path | Robot = urdfkin.load(Path("panda")) if loaded else Path("panda")
+    report = validate(source, samples=0)
+    assert report.robots[0].name == "r"
+    assert report.command == "urdfkin validate ./panda --samples 0 --seed 0"
+    assert replayed(report.robots[0]) > 10
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_a_command_repeats_the_run_for_robots_with_the_same_options_and_for_a_text(tmp_path: Path) -> None:
+    floating = urdfkin.load("ur5", root_joint="floating")
+    report = validate(
+        ["planar_two_link", floating, "ur3", urdf_of("single_link"), urdf_of("odd_names")], samples=0
+    )
+    assert report.command.splitlines() == [
+        "urdfkin validate planar_two_link ur3 - --samples 0 --seed 0",
+        "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating",
+        "urdfkin validate - --samples 0 --seed 0",
+    ]
+    first = validate(["planar_two_link", TEXT], samples=3, seed=5)
+    path = tmp_path / "again.json"
+    good(*shlex.split(first.command)[1:], "--json", str(path), stdin=TEXT)
+    again = json.loads(path.read_text("utf-8"))
+    assert [robot["name"] for robot in again["robots"]] == ["planar_two_link", "r"]
+    assert [robot["checks"][0]["worst"] for robot in again["robots"]] == [
+        robot["checks"][0]["worst"] for robot in first.as_dict()["robots"]
+    ]

@@ -1,7 +1,5 @@
 """A store goes on where it was ended, trusts no file, and reports what one run would have reported."""
 
-from __future__ import annotations
-
 import gc
 import itertools
 import json
@@ -113,7 +111,9 @@ def test_a_store_of_other_settings_is_refused_and_both_are_shown(
     assert said in str(error.value)
 
 
-def test_changed_code_never_meets_old_results(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_changed_code_never_meets_old_results_and_its_digest_is_of_what_computes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(1))
     before = Store.reading(tmp_path, pytest.fail).manifest
     changed = results.provenance() | {"code": "0" * 64}
@@ -122,25 +122,21 @@ def test_changed_code_never_meets_old_results(monkeypatch: pytest.MonkeyPatch, t
         validate(ROBOTS, samples=SAMPLES, store=tmp_path)
     after = replace(before, provenance=changed)
     assert {before.key(0, i) for i in range(2)}.isdisjoint(after.key(0, i) for i in range(2))
-
-
-def test_the_digest_of_the_code_is_of_what_computes_and_not_of_what_shows(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+    package = tmp_path / "package"
     for place in ("kinematics/equations.py", "cli/validate.py", "urdf/lint/rules/joints.toml"):
-        (tmp_path / place).parent.mkdir(parents=True)
-        (tmp_path / place).write_text("1")
-    monkeypatch.setattr(results, "_PACKAGE", tmp_path)
+        (package / place).parent.mkdir(parents=True)
+        (package / place).write_text("1")
+    monkeypatch.setattr(results, "_PACKAGE", package)
     before = results._code()
-    (tmp_path / "cli" / "validate.py").write_text("2")
+    (package / "cli" / "validate.py").write_text("2")
     assert results._code() == before
     for place in ("kinematics/equations.py", "urdf/lint/rules/joints.toml"):
-        (tmp_path / place).write_text("2")
+        (package / place).write_text("2")
         assert results._code() != before
         before = results._code()
 
 
-def test_a_file_that_has_changed_is_not_taken_for_what_it_was(tmp_path: Path) -> None:
+def test_a_changed_file_is_not_taken_for_what_it_was_and_another_folder_is_left_alone(tmp_path: Path) -> None:
     robot = tmp_path / "a.urdf"
     robot.write_text('<robot name="a"><link name="l"/></robot>')
     old = subject(str(robot))
@@ -150,6 +146,11 @@ def test_a_file_that_has_changed_is_not_taken_for_what_it_was(tmp_path: Path) ->
     with pytest.raises(InputError, match="has changed since the validation began"):
         old.carried()
     assert subject(str(robot)).carried().read().name == "b"
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(InputError, match="not empty and is not a store"):
+        validate("ur5", samples=0, store=tmp_path)
+    with pytest.raises(SourceError):
+        stored(tmp_path)
 
 
 def test_what_failed_is_tried_again_when_asked_for_and_may_be_another_text(tmp_path: Path) -> None:
@@ -316,14 +317,6 @@ def test_a_tampered_manifest_is_refused_with_the_place(entry: str, value: object
         stored(tmp_path)
 
 
-def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(InputError, match="not empty and is not a store"):
-        validate("ur5", samples=0, store=tmp_path)
-    with pytest.raises(SourceError):
-        stored(tmp_path)
-
-
 # -- parts -------------------------------------------------------------------------------------------
 
 
@@ -348,25 +341,23 @@ def test_parts_from_several_machines_merge_to_the_report_of_one_run(undisturbed:
         part = validate(ROBOTS, samples=SAMPLES, store=tmp_path / str(i), shard=f"{i}/3")
         assert {robot.verdict for robot in part.robots} <= {Verdict.VERIFIED, Verdict.BAD_INPUT}
     whole = tmp_path / "whole"
-    early = run("report", "merge", str(whole), str(tmp_path / "1"), str(tmp_path / "3"))
+    early = run("report merge", str(whole), str(tmp_path / "1"), str(tmp_path / "3"))
     assert "chunks missing" in early.text
     assert stored(whole).interrupted
-    merged = run("report", "merge", str(whole), *(str(tmp_path / str(i)) for i in (1, 2, 3)))
+    merged = run("report merge", str(whole), *(str(tmp_path / str(i)) for i in (1, 2, 3)))
     assert merged.text.endswith("complete\n"), merged.err
     assert numbers(stored(whole)) == undisturbed
 
 
-def test_parts_may_share_a_folder(undisturbed: str, tmp_path: Path) -> None:
+def test_parts_may_share_a_folder_and_begin_at_the_same_time(undisturbed: str, tmp_path: Path) -> None:
     for i in (2, 1, 3):
         validate(ROBOTS, samples=SAMPLES, store=tmp_path, shard=f"{i}/3")
     assert numbers(stored(tmp_path)) == undisturbed
-
-
-def test_parts_may_begin_at_the_same_time(tmp_path: Path) -> None:
-    """The second comes after the first has its lock, and before it has written what the campaign is."""
-    (tmp_path / ".writing" / "1-of-2").mkdir(parents=True)
-    (tmp_path / "lock-1-of-2").touch()
-    assert validate("planar_two_link", samples=0, store=tmp_path, shard="1/1").passed
+    # the second comes after the first has its lock, and before it has written what the campaign is
+    other = tmp_path / "other"
+    (other / ".writing" / "1-of-2").mkdir(parents=True)
+    (other / "lock-1-of-2").touch()
+    assert validate("planar_two_link", samples=0, store=other, shard="1/1").passed
 
 
 @pytest.mark.parametrize(("samples", "cuts"), [(60, (1, 2, 3)), (1000, (1, 5, 40))])
@@ -443,9 +434,7 @@ def test_a_client_killed_at_any_time_loses_nothing_that_was_kept(undisturbed: st
     rng, seen = np.random.default_rng(20), 0
     for _ in range(4):
         with subprocess.Popen(
-            [*_COMMAND, str(tmp_path / "s")],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            [*_COMMAND, str(tmp_path / "s")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         ) as process:
             deadline = time.monotonic() + 60
             while len(files(tmp_path / "s")) <= seen and process.poll() is None:
@@ -510,7 +499,7 @@ def test_a_clock_that_is_set_back_changes_nothing(
 
 def test_status_says_what_is_done_what_failed_and_what_is_left(tmp_path: Path) -> None:
     validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(5))
-    found = run("report", "status", str(tmp_path))
+    found = run("report status", str(tmp_path))
     assert found.code == 3
     assert "robots: 2 of 3 done, 1 of them failed" in found.text
     assert "chunks: 3 done, 3 missing" in found.text
@@ -518,7 +507,7 @@ def test_status_says_what_is_done_what_failed_and_what_is_left(tmp_path: Path) -
     assert "on one processor" in found.text
     assert "no process is running" in found.text
     validate(ROBOTS, samples=SAMPLES, store=tmp_path)
-    assert "chunks: 6 done, 0 missing" in run("report", "status", str(tmp_path)).text
+    assert "chunks: 6 done, 0 missing" in run("report status", str(tmp_path)).text
 
 
 def test_a_campaign_of_a_robot_from_another_format_is_resumed(tmp_path: Path) -> None:

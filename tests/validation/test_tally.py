@@ -1,7 +1,5 @@
 """A tally counts what lies outside its bound, adds up in any cut, and knows the worst case."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,6 +8,7 @@ import pytest
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
 from urdfkin.verify.bounds import Bound
+from urdfkin.verify.certificate import Comparison
 
 FRAMES = ("a", "b", "c")
 
@@ -24,14 +23,15 @@ def made(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> 
 
 
 @pytest.mark.parametrize(
-    ("units", "failed"), [(9.0, 0), (10.0, 0), (11.0, 1), (14.0, 1), (math.inf, 1), (math.nan, 1)]
+    ("units", "failed"), [(9.0, 0), (10.0, 0), (11.0, 1), (14.0, 1), (30.0, 1), (math.inf, 1), (math.nan, 1)]
 )
-def test_a_result_outside_its_bound_is_counted_however_little_it_lies_outside(
+def test_a_result_outside_its_bound_is_counted_however_little_and_disagrees(
     units: float, failed: int
 ) -> None:
     found = made(np.array([[1.0, units, 2.0]]))
     assert (found.results, found.failed) == (3, failed)
     assert (found.share > 1.0) == bool(failed)
+    assert Comparison(3, 1.0, found.share, ()).agrees == (not failed)
     assert found.case is not None
     assert found.case.frame == "b"
 
@@ -69,27 +69,20 @@ def test_a_percentile_is_the_upper_edge_of_its_bin_and_never_above_the_worst() -
     assert percentile([0, 0, 0, 0], edges, 0.0, 50.0) == 0.0
 
 
-def test_what_lies_on_an_edge_is_counted_above_it() -> None:
+def test_the_histogram_has_ten_bins_a_decade_and_counts_an_edge_above_it() -> None:
     edge = float(HISTOGRAM_EDGES[30])
     assert histogram_bin(edge, HISTOGRAM_EDGES) == 31
     assert histogram_bin(math.nextafter(edge, 0.0), HISTOGRAM_EDGES) == 30
     assert histogram_bin(math.inf, HISTOGRAM_EDGES) == len(HISTOGRAM_EDGES)
     assert histogram_bin(0.0, HISTOGRAM_EDGES) == 0
-
-
-def test_the_histogram_has_ten_bins_a_decade_from_a_thousandth_to_a_hundred_thousand() -> None:
     assert len(HISTOGRAM_EDGES) == 81
     np.testing.assert_allclose(HISTOGRAM_EDGES[[0, 10, 30, 80]], [1e-3, 1e-2, 1.0, 1e5])
 
 
-def test_results_without_numbers_agree_and_have_no_bound() -> None:
-    """The Jacobian of a robot that does not move."""
+def test_results_without_numbers_agree_and_tallies_of_other_frames_do_not_add_up() -> None:
     nothing = np.zeros((4, 3, 6, 0))
     bound = Bound(nothing, np.ones((4, 3, 1, 1)))
     found = tally(nothing, nothing, bound, FRAMES, 0, [([], [], [])] * 4)
     assert found == Tally(12, 0, 0.0, 0.0, (12, *([0] * 81)), (0.0,) * 3, None, (math.inf, 0.0))
-
-
-def test_tallies_of_other_frames_do_not_add_up() -> None:
     with pytest.raises(ValueError, match=r"shorter|longer"):
         _ = made(np.ones((1, 3))) + made(np.ones((1, 2)), 0, FRAMES[:2])

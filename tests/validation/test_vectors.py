@@ -4,8 +4,6 @@ The values are computed a second time by `tests/urdf_standard.py`, and the toler
 docs/vectors.md. Both share no code with urdfkin.
 """
 
-from __future__ import annotations
-
 import hashlib
 import importlib.util
 import json
@@ -24,18 +22,13 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
 from tests.urdf_standard import Robot, mp
 from urdfkin.system.resources import example_robots_dir, robots_dir
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.validation.vectors import (
-    VECTORS,
-    features,
-    stem,
-    write_features,
-    write_robot,
-    write_sums,
-)
+from urdfkin.validation.vectors import VECTORS, features, stem, write_features, write_robot, write_sums
+from urdfkin.verify.adapters import LIBRARIES
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
 
@@ -130,7 +123,7 @@ def test_an_implementation_written_from_the_standard_agrees_with_all_features(fo
 def test_an_implementation_written_from_the_standard_agrees_for_the_catalogue(
     name: str, tmp_path: Path
 ) -> None:
-    assert run("vectors", "write", str(tmp_path), name, "--samples", "2").code == 0
+    assert run("vectors write", str(tmp_path), name, "--samples", "2").code == 0
     assert agree(tmp_path / f"{name}.json") > 0
 
 
@@ -402,11 +395,12 @@ def test_the_reader_in_python_finds_every_number_changed_by_a_billionth_of_its_s
     assert len(kinds) == 19
 
 
-def test_the_reader_reports_nan_and_a_wrong_shape_and_skips_what_is_not_computed(folder: Path) -> None:
+def test_the_reader_reports_nan_and_a_wrong_shape_and_stands_on_the_page(folder: Path) -> None:
     path = folder / "mimic.json"
     assert len(list(wrong(path, lambda *_: np.full(16, np.nan)))) == 3 * 16 + 3 * 18
     assert "1 numbers, expected 16" in next(wrong(path, lambda *_: 1.0))
     assert not list(wrong(path, lambda *_: None))
+    assert (EXAMPLES / "compare.py").read_text("utf-8") in (ROOT / "docs" / "vectors.md").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -460,10 +454,6 @@ def test_the_reader_in_cpp_finds_every_number_changed_by_a_billionth_of_its_size
     assert compared(program, vectors, tmp_path / "missing")[0] == 2
 
 
-def test_the_page_prints_the_reader() -> None:
-    assert (EXAMPLES / "compare.py").read_text("utf-8") in (ROOT / "docs" / "vectors.md").read_text("utf-8")
-
-
 # -- the files ------------------------------------------------------------------------------------------
 
 
@@ -505,7 +495,7 @@ def test_the_files_are_the_same_in_another_process_with_another_hash_seed(
 def test_all_files_with_the_catalogue_are_written_twice_the_same(tmp_path: Path) -> None:
     first, second = tmp_path / "a", tmp_path / "b"
     for made in (first, second):
-        assert run("vectors", "write", str(made)).code == 0
+        assert run("vectors write", str(made)).code == 0
     assert (first / "SHA256SUMS").read_bytes() == (second / "SHA256SUMS").read_bytes()
     found = [document(path) for path in first.glob("*.json")]
     assert len(found) == len(features()) + len(catalogue())
@@ -514,24 +504,16 @@ def test_all_files_with_the_catalogue_are_written_twice_the_same(tmp_path: Path)
             assert one["k"] * EPS < 1e-10
 
 
-def test_the_features_are_many_and_have_names_and_files_of_their_own() -> None:
+def test_the_features_are_many_have_names_of_their_own_and_notes_on_libraries_that_differ() -> None:
     assert len(features()) >= 60
     names = [stem(name).casefold() for name in (*features(), *catalogue())]
     assert len(set(names)) == len(names)
     assert len({feature.data for feature in features().values()}) == len(features())
-
-
-def test_the_note_of_a_feature_names_each_library_that_the_table_shows_to_differ() -> None:
-    from urdfkin.verify.adapters import LIBRARIES  # noqa: PLC0415
-
     table = document(ROOT / "docs" / "libraries.json")["cells"]
     for library, column in table.items():
         for name, cell in column.items():
             named = LIBRARIES[library].title in (features()[name].note or "")
             assert named == (cell["verdict"] != "right"), (library, name)
-
-
-def test_the_files_that_urdfkin_refuses_have_a_note_that_states_it() -> None:
     for feature in features().values():
         try:
             urdfkin.load(feature.data, verify=False)
@@ -549,11 +531,10 @@ def test_a_robot_of_the_catalogue_is_written_by_reference_and_another_one_with_i
 ) -> None:
     text = urdfkin.load("planar_two_link").urdf
     (tmp_path / "mine.urdf").write_text(text.replace('"planar_two_link"', '"my arm"'))
-    done = run(
+    done = good(
         *("vectors", "write", str(tmp_path / "out"), "ur5", str(tmp_path / "mine.urdf")),
         *("--samples", "2", "--format", "json"),
     )
-    assert done.code == 0, done.err
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         "ur5.json", "ur5.tsv", "my_arm.json", "my_arm.tsv", "my_arm.urdf", "SHA256SUMS",
     }  # fmt: skip
@@ -567,11 +548,7 @@ def test_a_robot_of_the_catalogue_is_written_by_reference_and_another_one_with_i
 
 def test_bad_arguments_are_explained(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    done = run("vectors", "write", str(tmp_path / "file"), "ur5")
-    assert done.code == 2
-    assert "cannot be written" in done.err
-    assert "name the folder" in run("vectors", "write").err
-    done = run("vectors", "write", str(tmp_path), "ur5", "ur5")
-    assert done.code == 2
-    assert "two robots have the same name" in done.err
-    assert json.loads(run("vectors", "write", "--schema").text)["title"] == VECTORS.name
+    assert "cannot be written" in refused("vectors write", str(tmp_path / "file"), "ur5")
+    assert "name the folder" in run("vectors write").err
+    assert "two robots have the same name" in refused("vectors write", str(tmp_path), "ur5", "ur5")
+    assert json.loads(run("vectors write --schema").text)["title"] == VECTORS.name

@@ -1,11 +1,10 @@
-"""A process that dies costs its robot and nothing else; everything else is as in one process."""
-
-from __future__ import annotations
+"""A process that dies costs its robot and nothing else, and every task is dealt once."""
 
 import os
 import pickle
 import signal
 import time
+from collections.abc import Iterator
 from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,15 @@ import pytest
 
 from tests.attacks.test_validation_signals import children
 from tests.validation import canned_worker
+from urdfkin.urdf.sources import Origin
 from urdfkin.validation import answer, engines, memory, worker_processes
 from urdfkin.validation.answer import Answer
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import Chunk
+from urdfkin.validation.chunk import Chunk, Cut
 from urdfkin.validation.collector import CampaignProgress
+from urdfkin.validation.engines import Row, Task, WorkQueue
 from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.robot_input import RobotInput
 
 DEADLY = "ur5"
 ROBOTS = ["double_pendulum", DEADLY, "iris_simple"]
@@ -153,9 +155,7 @@ def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
         assert asked >= 2
 
 
-def test_a_worker_runs_nothing_of_the_current_folder(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     codes: list[list[str]] = []
 
     class RecordedError(Exception):
@@ -206,3 +206,63 @@ def test_workers_killed_at_random_times_change_no_number(
 
         assert numbers(validate(robots, samples=100, jobs=2, progress=kill)) == expected
     assert killed > 20
+
+
+# -- who has which task ----------------------------------------------------------------------------
+
+
+CUT, NOBODY = Cut(100), RobotInput(b"", Origin(""))
+
+
+def work(robots: int) -> Iterator[Iterator[Task]]:
+    """Four chunks for each robot."""
+    return (iter([Task(i, CUT.chunk(NOBODY, 0, k)) for k in range(4)]) for i in range(robots))
+
+
+def step(deal: WorkQueue, row: Row | None) -> tuple[tuple[int, int] | None, Row | None]:
+    """What somebody with a row, or without, is given; and the row that they have then."""
+    if row is not None and (task := deal.next(row)) is not None:
+        return (task.robot, task.chunk.index), row
+    if (found := deal.first()) is None:
+        return None, None
+    task, row = found
+    return (task.robot, task.chunk.index), row
+
+
+def test_two_have_a_robot_each_and_share_the_last_and_what_is_put_back_is_dealt_again() -> None:
+    deal, rows = WorkQueue(work(3)), list[Row | None]([None, None])
+    seen = [list[tuple[int, int]](), list[tuple[int, int]]()]
+    for turn in (0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1):
+        given, rows[turn] = step(deal, rows[turn])
+        assert given is not None
+        seen[turn].append(given)
+    assert {robot for robot, _ in seen[0]} == {0, 2}
+    assert {robot for robot, _ in seen[1]} == {1, 2}
+    assert sorted(seen[0] + seen[1]) == [(i, k) for i in range(3) for k in range(4)]
+    assert deal.first() is None
+    for shared in (True, False):
+        deal = WorkQueue(work(2), shared=shared)
+        found = deal.first()
+        assert found is not None
+        task, row = found
+        deal.put_back(task, row)
+        again = deal.first()
+        assert again is not None
+        assert again[0] == task
+        assert [left.chunk.index for left in deal.withdraw(0)] == [1, 2, 3]
+        assert deal.next(row) is None
+        assert [(step(deal, None)[0] or (0, 0))[0]] == [1]
+
+
+def test_help_goes_to_the_robot_of_which_most_is_left_and_nobody_helps_where_each_is_alone() -> None:
+    deal = WorkQueue(work(2))
+    (_, first), (_, second) = deal.first() or ((), Row(())), deal.first() or ((), Row(()))
+    for _ in range(2):
+        deal.next(first)
+    task, row = deal.first() or (None, None)
+    assert task is not None
+    assert row is second
+    assert (task.robot, task.chunk.index) == (1, 1)
+    deal = WorkQueue(work(1), shared=False)
+    assert deal.first() is not None
+    assert deal.first() is None

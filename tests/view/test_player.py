@@ -1,7 +1,5 @@
 """The viewer plays a trajectory sample by sample, checks each, and saves pictures and motions."""
 
-from __future__ import annotations
-
 import io
 import re
 import struct
@@ -14,8 +12,9 @@ import pytest
 from PIL import Image
 
 import urdfkin
+from tests.attacks.test_viewer_gate import free_port
 from tests.report.browser import opened, require_chromium
-from tests.view.test_viewer import _PRESS, _until, free_port
+from tests.view.test_viewer import _PRESS, _until
 from urdfkin.robot.trajectory import line
 from urdfkin.view.player import Player, as_gif, as_png
 from urdfkin.view.server import new_server
@@ -51,7 +50,7 @@ def test_the_time_slider_shows_the_nearest_sample_and_its_checked_numbers(viewer
     np.testing.assert_allclose(viewer.sliders.handles[0].value, np.rad2deg(x.q[5, 0]), rtol=1e-14)
 
 
-def test_it_plays_to_the_end_at_the_chosen_speed_and_stops(viewer: Viewer) -> None:
+def test_it_plays_to_the_end_at_the_chosen_speed_and_a_pause_keeps_the_sample(viewer: Viewer) -> None:
     player(viewer).show(0)
     player(viewer).speed.value = "0.5"
     begin = time.perf_counter()
@@ -61,9 +60,6 @@ def test_it_plays_to_the_end_at_the_chosen_speed_and_stops(viewer: Viewer) -> No
     assert player(viewer).sample == 8
     assert time.perf_counter() - begin > 0.7, "0.4 s at half the speed"
     player(viewer).speed.value = "1"
-
-
-def test_a_pause_keeps_the_sample(viewer: Viewer) -> None:
     player(viewer).show(0)
     player(viewer).speed.value = "0.1"
     player(viewer).play()
@@ -82,21 +78,18 @@ def test_the_whole_trajectory_is_checked_for_each_frame(viewer: Viewer) -> None:
     assert "9 samples, verified by Pinocchio" in player(viewer).words.content
 
 
-def test_a_saved_motion_has_all_frames_and_takes_as_long_as_the_motion() -> None:
+def test_a_saved_motion_has_all_frames_and_a_saved_picture_is_opaque() -> None:
     frames = [np.full((8, 10, 3), 40 * k, dtype=np.uint8) for k in range(5)]
     image = Image.open(io.BytesIO(as_gif(frames, 0.08)))
     assert image.size == (10, 8)
     assert image.n_frames == 5
     assert image.info["duration"] == 80
     assert image.info["loop"] == 0
-
-
-def test_a_saved_picture_is_opaque() -> None:
     clear = np.zeros((4, 4, 4), dtype=np.uint8)
     assert np.asarray(Image.open(io.BytesIO(as_png(clear)))).tolist() == [[[255, 255, 255]] * 4] * 4
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 def test_in_a_browser_the_picture_and_the_motion_are_saved(viewer: Viewer, tmp_path: Path) -> None:
     require_chromium()
@@ -106,7 +99,7 @@ def test_in_a_browser_the_picture_and_the_motion_are_saved(viewer: Viewer, tmp_p
         behaviour = {"behavior": "allow", "downloadPath": str(saved)}
         browser.chrome.execute_cdp_cmd("Page.setDownloadBehavior", behaviour)
         browser.chrome.get(viewer.server.address)
-        assert _until(lambda: "verified" in browser.js("return document.body.innerText"))
+        browser.wait_for("verified")
         for label, ending, head in (
             ("save a picture (PNG)", "png", b"\x89PNG"),
             ("save the motion (GIF)", "gif", b"GIF89a"),

@@ -1,25 +1,25 @@
 """The viewer listens to this machine alone, follows its controls, and says what to install without viser."""
 
-from __future__ import annotations
-
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import urdfkin
+from tests.attacks.test_viewer_gate import free_port
 from tests.report.browser import Browser, opened, require_chromium
-from urdfkin.cli.view import command
+from tests.urdfs import joint, limit
+from tests.urdfs import robot as robot_of
 from urdfkin.errors import InputError
 from urdfkin.errors.escape import markdown_text
 from urdfkin.model.configuration import checked
@@ -39,29 +39,26 @@ from urdfkin.view.viewer import (
 viser = pytest.importorskip("viser")
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+@contextmanager
+def shown_robot(robot: urdfkin.Robot, **how: Any) -> Iterator[Viewer]:
+    server = new_server(port=free_port())
+    try:
+        yield Viewer(server, robot, **how)
+    finally:
+        server.stop()
 
 
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
-    server = new_server(port=free_port())
-    yield Viewer(server, urdfkin.load("ur5"))
-    server.stop()
+    with shown_robot(urdfkin.load("ur5")) as viewer:
+        yield viewer
 
 
-@pytest.mark.slow
-def test_it_answers_on_loopback_and_nowhere_else(viewer: Viewer) -> None:
-    port = viewer.server.get_port()
-    assert viewer.server.get_host() == "127.0.0.1"
-    with urlopen(viewer.server.address) as answer:
-        assert answer.status == 200
-    own = socket.gethostbyname(socket.gethostname())
-    if not own.startswith("127."):
-        with pytest.raises(OSError, match="refused"):
-            socket.create_connection((own, port), timeout=2).close()
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A browser for all tests that draw nothing."""
+    with opened(tmp_path_factory.mktemp("profile"), width=900, height=700, draws=False) as browser:
+        yield browser
 
 
 @pytest.mark.slow
@@ -106,9 +103,8 @@ def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> 
 @pytest.mark.slow
 def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
     robot = urdfkin.load("a1", verify=False)
-    mujoco, server = robot.convention("mujoco"), new_server(port=free_port())
-    try:
-        viewer = Viewer(server, robot, conversion=mujoco)
+    mujoco = robot.convention("mujoco")
+    with shown_robot(robot, conversion=mujoco) as viewer:
         viewer.set_q(q := robot.sample(1, 5)[0])
         numbers = [float(x) for x in viewer.words_of_q.value.split(",")]
         assert numbers == mujoco.to(q).tolist()
@@ -116,48 +112,38 @@ def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
         viewer.words_of_q.value = written(mujoco.to(other := robot.sample(1, 6)[0]))
         viewer._typed(SimpleNamespace(client=object()))
         np.testing.assert_array_equal(viewer.q, other)
-    finally:
-        server.stop()
 
 
-def test_a_slider_ends_where_its_joint_does() -> None:
+def test_a_slider_ends_where_its_joint_does_and_a_joint_without_a_range_has_none() -> None:
     robot = urdfkin.load("panda")
     rows = {row.name: row for row in coordinate_rows(robot)}
-    limit = robot.tree.joints[[joint.name for joint in robot.tree.joints].index("panda_joint4")].limit
-    assert limit is not None
-    assert (rows["panda_joint4"].lower, rows["panda_joint4"].upper) == (limit.lower, limit.upper)
-    assert within_limits(robot, robot.neutral())[3] == limit.upper < 0.0
+    own = robot.tree.joints[[joint.name for joint in robot.tree.joints].index("panda_joint4")].limit
+    assert own is not None
+    assert (rows["panda_joint4"].lower, rows["panda_joint4"].upper) == (own.lower, own.upper)
+    assert within_limits(robot, robot.neutral())[3] == own.upper < 0.0
     assert [row.name for row in coordinate_rows(urdfkin.load("ur5", root_joint="floating"))][:4] == [
         "root_joint.x", "root_joint.y", "root_joint.z", "shoulder_pan_joint",
     ]  # fmt: skip
+    with pytest.warns(UrdfWarning, match="its limits are equal"):
+        robot = urdfkin.load(
+            robot_of(
+                joint("turns", "revolute", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(-1, 1)),
+                joint("stays", "revolute", "b", "c", 'xyz="0 0 1"', "0 1 0", limit(0.5, 0.5)),
+            )
+        )
+    assert [row.name for row in coordinate_rows(robot)] == ["turns"]
+    assert fixed_coordinates(robot) == ["stays"]
+    assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
 
 
-def test_angles_are_in_degrees_at_first_and_a_step_is_one_degree(viewer: Viewer) -> None:
+def test_a_step_is_one_degree_and_the_limits_stand_at_both_ends_of_a_slider(viewer: Viewer) -> None:
     assert viewer.units.value == "degrees"
     assert {handle.step for handle in viewer.sliders.handles} == {1.0}
-
-
-def test_the_limits_stand_at_both_ends_of_a_slider(viewer: Viewer) -> None:
     viewer.set_q(np.zeros(6))
     for row, handle in zip(viewer.sliders.rows, viewer.sliders.handles, strict=True):
         ends = np.rad2deg([row.lower, row.upper])
         assert [mark.value for mark in handle._marks] == pytest.approx(ends)
         assert [float(mark.label) for mark in handle._marks] == pytest.approx(ends, abs=0.05)
-
-
-_FIXED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-<joint name="turns" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="stays" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0 0 1"/>
-<axis xyz="0 1 0"/><limit lower="0.5" upper="0.5" effort="1" velocity="1"/></joint></robot>"""
-
-
-def test_a_joint_without_a_range_has_no_slider_and_is_named() -> None:
-    with pytest.warns(UrdfWarning, match="its limits are equal"):
-        robot = urdfkin.load(_FIXED)
-    assert [row.name for row in coordinate_rows(robot)] == ["turns"]
-    assert fixed_coordinates(robot) == ["stays"]
-    assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
 
 
 def test_missing_meshes_are_named_with_the_remedy() -> None:
@@ -264,16 +250,12 @@ def test_without_the_extra_one_line_says_what_to_install(monkeypatch: pytest.Mon
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar_two_link", "romeo", "alex_psyonic_hands"])
 def test_robots_of_other_kinds_are_shown_too(name: str) -> None:
-    server = new_server(port=free_port())
-    try:
-        viewer = Viewer(server, urdfkin.load(name, root_joint=None))
+    with shown_robot(urdfkin.load(name, root_joint=None)) as viewer:
         viewer.set_q(viewer.robot.sample(1, 0)[0])
         assert viewer.motion.agrees
-    finally:
-        server.stop()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 def test_a_browser_draws_it_without_errors_and_without_asking_elsewhere(
     viewer: Viewer, tmp_path: Path
@@ -285,13 +267,9 @@ def test_a_browser_draws_it_without_errors_and_without_asking_elsewhere(
     with opened(tmp_path, width=640, height=400) as browser:  # drawn by software, pixel by pixel
         browser.requests()
         browser.chrome.get(viewer.server.address)
-        for _ in range(60):
-            if "verified" in browser.js("return document.body.innerText"):
-                break
-            time.sleep(0.5)
+        browser.wait_for("verified")
         time.sleep(2.0)
         browser.screenshot("viewer")
-        assert "verified" in browser.js("return document.body.innerText")
         asked = browser.requests()
         elsewhere = [url for url in asked if not url.startswith((address, "data:", "blob:", "chrome"))]
         assert [url for url in elsewhere if not url.startswith("ws://127.0.0.1")] == []
@@ -305,20 +283,27 @@ _UNNAMED = """return [...document.querySelectorAll("[role=slider], [role=button]
   .map((e) => e.outerHTML.slice(0, 300))"""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("dark", [False, True])
-def test_the_page_follows_the_theme_of_the_browser_and_its_words_stand_out(
-    viewer: Viewer, tmp_path: Path, dark: bool
+def test_the_page_follows_the_theme_of_the_browser_and_its_words_and_focus_stand_out(
+    viewer: Viewer, chromium: Browser, dark: bool
 ) -> None:
-    require_chromium()
-    with opened(tmp_path, width=900, height=700, dark=dark, draws=False) as browser:
-        browser.chrome.get(viewer.server.address)
-        assert _until(lambda: "verified" in browser.js("return document.body.innerText"))
-        scheme = "return document.documentElement.dataset.mantineColorScheme"
-        assert browser.js(scheme) == ("dark" if dark else "light")
-        for words, behind in browser.js(_COLOURS):
-            assert _contrast(words, behind) >= 4.5, (words, behind)
+    chromium.become(900, 700, dark=dark)
+    chromium.chrome.get(viewer.server.address)
+    chromium.wait_for("verified")
+    scheme = "return document.documentElement.dataset.mantineColorScheme"
+    assert chromium.js(scheme) == ("dark" if dark else "light")
+    for words, behind in chromium.js(_COLOURS):
+        assert _contrast(words, behind) >= 4.5, (words, behind)
+    kinds = set()
+    for _ in range(14):
+        chromium.chrome.switch_to.active_element.send_keys("\ue004")
+        kind, width, ring, behind = chromium.js(_RING)
+        kinds.add(kind)
+        assert width >= 2.0, kind
+        assert _contrast(ring, behind) >= 3.0, (kind, ring, behind)
+    assert kinds >= {"INPUT", "BUTTON"}
 
 
 #: The colour of each label and button, and the first colour behind it that is not transparent.
@@ -341,24 +326,6 @@ def _contrast(*colours: list[float]) -> float:
     return max(light) / min(light)
 
 
-@pytest.mark.long
-@pytest.mark.browser
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_every_control_has_a_focus_that_stands_out(dark: bool, viewer: Viewer, tmp_path: Path) -> None:
-    require_chromium()
-    with opened(tmp_path, width=900, height=700, dark=dark, draws=False) as browser:
-        browser.chrome.get(viewer.server.address)
-        assert _until(lambda: browser.js("return document.querySelectorAll('input').length > 5"))
-        kinds = set()
-        for _ in range(14):
-            browser.chrome.switch_to.active_element.send_keys("\ue004")
-            kind, width, ring, behind = browser.js(_RING)
-            kinds.add(kind)
-            assert width >= 2.0, kind
-            assert _contrast(ring, behind) >= 3.0, (kind, ring, behind)
-        assert kinds >= {"INPUT", "BUTTON"}
-
-
 #: The element with the focus: its kind, the width and colour of its outline, and the colour behind it.
 _RING = """const e = document.activeElement, style = getComputedStyle(e);
   const colour = (x) => getComputedStyle(x).backgroundColor;
@@ -369,17 +336,16 @@ _RING = """const e = document.activeElement, style = getComputedStyle(e);
     numbers(style.outlineColor), numbers(colour(behind))];"""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
-def test_folders_open_by_the_keyboard(viewer: Viewer, tmp_path: Path) -> None:
-    require_chromium()
-    with opened(tmp_path, width=900, height=700, draws=False) as browser:
-        browser.chrome.get(viewer.server.address)
-        bar = "return [...document.querySelectorAll('[role=button]')].find((b) => b.innerText === 'Show')"
-        assert _until(lambda: browser.js(bar) is not None)
-        for expanded in ("false", "true"):
-            browser.js(bar).send_keys("\ue007")
-            assert _until(lambda e=expanded: browser.js(bar).get_attribute("aria-expanded") == e)  # type: ignore[misc]
+def test_folders_open_by_the_keyboard(viewer: Viewer, chromium: Browser) -> None:
+    chromium.become(900, 700)
+    chromium.chrome.get(viewer.server.address)
+    bar = "return [...document.querySelectorAll('[role=button]')].find((b) => b.innerText === 'Show')"
+    assert _until(lambda: chromium.js(bar) is not None)
+    for expanded in ("false", "true"):
+        chromium.js(bar).send_keys("\ue007")
+        assert _until(lambda e=expanded: chromium.js(bar).get_attribute("aria-expanded") == e)  # type: ignore[misc]
 
 
 _PRESS = "[...document.querySelectorAll('button')].find((b) => b.innerText == arguments[0]).click()"
@@ -408,57 +374,45 @@ def _until(holds: Callable[[], bool]) -> bool:
     return False
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("width", [1280, 390])
-def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(tmp_path: Path, width: int) -> None:
-    require_chromium()
-    server = new_server(port=free_port())
-    try:
-        # Without its shapes, and nothing is drawn: by software a browser would spend its time there.
-        bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("panda").urdf, flags=re.DOTALL)
-        viewer = Viewer(server, urdfkin.load(bare))
+def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(
+    chromium: Browser, width: int
+) -> None:
+    # Without its shapes, and nothing is drawn: by software a browser would spend its time there.
+    bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("panda").urdf, flags=re.DOTALL)
+    with shown_robot(urdfkin.load(bare)) as viewer:
         n = len(viewer.sliders.rows)
 
         def equal() -> bool:
-            shown = _sliders(browser, n)
+            shown = _sliders(chromium, n)
             return len(shown) == n and bool(np.allclose(shown, viewer.q, rtol=0.0, atol=1e-12))
 
-        with opened(tmp_path, width=width, height=844, draws=False) as browser:
-            browser.chrome.get(server.address)
-            if width < 600:
-                assert _until(lambda: "show the controls" in browser.js("return document.body.innerText"))
-                assert _sliders_in_sight(browser) == 0, "on a phone the panel is folded at first"
-                browser.js(_PRESS, "show the controls")
-                assert _until(lambda: _sliders_in_sight(browser) == n)
-            assert _until(equal)
-            viewer.set_q(viewer.robot.sample(1, 3)[0])
-            assert _until(equal)
-            for label in ("random", "neutral, within the limits", "random"):
-                before = viewer.q.copy()
-                browser.js(_PRESS, label)
-                assert _until(lambda before=before: bool((viewer.q != before).any())), label  # type: ignore[misc]
-                assert _until(equal), label
+        chromium.become(width, 844)
+        chromium.chrome.get(viewer.server.address)
+        if width < 600:
+            chromium.wait_for("show the controls")
+            assert _until(lambda: _sliders_in_sight(chromium) == 0), "on a phone the panel is folded at first"
+            chromium.js(_PRESS, "show the controls")
+            assert _until(lambda: _sliders_in_sight(chromium) == n)
+        assert _until(equal)
+        viewer.set_q(viewer.robot.sample(1, 3)[0])
+        assert _until(equal)
+        for label in ("random", "neutral, within the limits", "random"):
             before = viewer.q.copy()
-            thumb = browser.chrome.find_elements("css selector", "[role=slider]")[4]
-            thumb.send_keys("\ue014")  # one step to the right
-            assert _until(lambda: viewer.q[4] != before[4])
-            assert (np.delete(viewer.q, 4) == np.delete(before, 4)).all(), "the others stay, to the bit"
-            assert abs(np.rad2deg(viewer.q[4] - before[4]) - 1.0) < 0.01, "one key moves one degree"
-            assert _until(equal)
-            # On a telephone, too, nothing lies beyond the edge.
-            assert all(0 <= left < right <= width for left, right in browser.js(_EDGES)[:n])
-            browser.screenshot(f"viewer-{width}")
-    finally:
-        server.stop()
-
-
-def test_a_start_and_a_trajectory_exclude_each_other(tmp_path: Path) -> None:
-    file = tmp_path / "motion.csv"
-    words = ["planar_two_link", "--q", "0,0", "--trajectory", str(file), "--no-browser"]
-    found = CliRunner().invoke(command, words)
-    assert found.exit_code == 2
-    assert "--q and --trajectory cannot be used together" in found.output
+            chromium.js(_PRESS, label)
+            assert _until(lambda before=before: bool((viewer.q != before).any())), label  # type: ignore[misc]
+            assert _until(equal), label
+        before = viewer.q.copy()
+        chromium.chrome.find_elements("css selector", "[role=slider]")[4].send_keys("\ue014")  # a step right
+        assert _until(lambda: viewer.q[4] != before[4])
+        assert (np.delete(viewer.q, 4) == np.delete(before, 4)).all(), "the others stay, to the bit"
+        assert abs(np.rad2deg(viewer.q[4] - before[4]) - 1.0) < 0.01, "one key moves one degree"
+        assert _until(equal)
+        # On a telephone, too, nothing lies beyond the edge.
+        assert all(0 <= left < right <= width for left, right in chromium.js(_EDGES)[:n])
+        chromium.screenshot(f"viewer-{width}")
 
 
 @pytest.mark.slow

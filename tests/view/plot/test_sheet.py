@@ -1,7 +1,5 @@
 """The sheet draws the numbers, says what was checked, and the same motion gives the same file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -29,8 +27,19 @@ def case() -> Case:
     return robot, frame_motion(robot, x, robot.tip_frame), x
 
 
-def test_the_command_offers_every_panel_there_is() -> None:
+def test_the_title_says_from_where_to_where_every_panel_is_offered_and_lines_differ(
+    case: Case, tmp_path: Path
+) -> None:
     assert (*COORDINATES, *PANELS) == OFFERED
+    assert len({tuple(_look(k).values()) for k in range(14)}) == 14
+    robot, x, trajectory = case
+    title = sheet(robot, x, trajectory, ["position"]).get_suptitle()
+    start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0) for k in (0, -1))
+    assert title.endswith(f"from ({start}) to ({end}) m in 1 s")
+    with pytest.raises(InputError, match="unknown picture format"):
+        save(sheet(*case, ["position"]), tmp_path / "a.bmp")
+    with pytest.raises(UnknownNameError, match="velocity"):
+        sheet(*case, ["velocty"])
 
 
 def test_the_lines_are_the_numbers(case: Case) -> None:
@@ -94,10 +103,6 @@ def test_of_many_joints_those_outside_their_limits_are_named_and_the_others_coun
     assert words == [f"{robot.nq - 2} others", "LElbowYaw", "RWristPitch", "outside the limits"]
 
 
-def test_fourteen_lines_differ_in_colour_or_dashes() -> None:
-    assert len({tuple(_look(k).values()) for k in range(14)}) == 14
-
-
 @pytest.mark.parametrize("panels", [[], ["q"], ["position", "velocity", "disagreement"]])
 def test_a_sheet_fits_a_page_and_no_curve_touches_the_top(panels: list[str], case: Case) -> None:
     figure = sheet(*case, panels)
@@ -111,14 +116,20 @@ def test_a_sheet_fits_a_page_and_no_curve_touches_the_top(panels: list[str], cas
             assert upper - largest > 0.03 * (upper - lower), axes.get_ylabel()
 
 
-def test_where_a_limit_is_left_a_cross_stands(case: Case) -> None:
-    robot, *_ = case
+def test_a_cross_stands_where_a_limit_is_left_and_the_bound_beside_what_it_bounds(case: Case) -> None:
+    robot, motion, trajectory = case
     x = line(robot, robot.poses["ready"], robot.poses["neutral"], 1.0, 21)
     (axes, _) = sheet(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
     crosses = next(drawn for drawn in axes.lines if drawn.get_label() == "outside the limits")
     outside = x.q[:, 3] > robot.limits[1, 3]
     assert outside.any()
     np.testing.assert_array_equal(crosses.get_ydata(), x.q[outside, 3])
+    (bounded,) = sheet(robot, motion, trajectory, ["disagreement"]).axes
+    for check in motion.checks.values():
+        assert (check.bound > 0.0).all()
+        np.testing.assert_allclose(check.units, check.share * check.bound, rtol=1e-12)
+        assert any(np.array_equal(drawn.get_ydata(), check.bound) for drawn in bounded.lines)
+    assert bounded.get_ylim()[1] > max(check.bound.max() for check in motion.checks.values())
 
 
 def test_no_axis_mixes_metres_and_radians(case: Case) -> None:
@@ -147,36 +158,12 @@ def test_a_floating_base_is_plotted_with_its_place_and_its_quaternion(tmp_path: 
     assert save(sheet(robot, motion, x), tmp_path / "a.svg")
 
 
-def test_the_bound_is_drawn_beside_what_it_bounds(case: Case) -> None:
-    robot, x, trajectory = case
-    (axes,) = sheet(robot, x, trajectory, ["disagreement"]).axes
-    for check in x.checks.values():
-        assert (check.bound > 0.0).all()
-        np.testing.assert_allclose(check.units, check.share * check.bound, rtol=1e-12)
-        assert any(np.array_equal(drawn.get_ydata(), check.bound) for drawn in axes.lines)
-    assert axes.get_ylim()[1] > max(check.bound.max() for check in x.checks.values())
-
-
-def test_the_title_says_from_where_to_where_and_how_long(case: Case) -> None:
-    robot, x, trajectory = case
-    title = sheet(robot, x, trajectory, ["position"]).get_suptitle()
-    start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0) for k in (0, -1))
-    assert title.endswith(f"from ({start}) to ({end}) m in 1 s")
-
-
 @pytest.mark.slow
 def test_every_panel_is_on_the_sheet_and_the_foot_says_what_was_checked(case: Case, tmp_path: Path) -> None:
     robot, x, trajectory = case
     written = "".join(ET.fromstring(save(sheet(robot, x, trajectory), tmp_path / "a.svg")).itertext())
-    for words in (
-        "position",
-        "velocity",
-        "parts",
-        "singular",
-        "manipulability",
-        "disagreement",
-        "verified by",
-    ):
+    panels = "position", "velocity", "parts", "singular", "manipulability", "disagreement"
+    for words in (*panels, "verified by"):
         assert words in written
     assert foot(x, trajectory) in written
 
@@ -189,10 +176,3 @@ def test_the_ending_says_the_format_and_the_same_motion_gives_the_same_file(
     files = [save(sheet(*case, ["position"]), tmp_path / f"a.{ending}") for _ in range(2)]
     assert files[0].startswith(head)
     assert files[0] == files[1]
-
-
-def test_unknown_endings_and_panels_are_refused_by_name(case: Case, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="unknown picture format"):
-        save(sheet(*case, ["position"]), tmp_path / "a.bmp")
-    with pytest.raises(UnknownNameError, match="velocity"):
-        sheet(*case, ["velocty"])

@@ -1,4 +1,4 @@
-"""A prefix that nobody declared is legal for urdfdom, so the robot is computed, checked and told about it."""
+"""Undeclared prefixes and remains of xacro: the robot is computed if its motion does not depend on them."""
 
 import warnings
 import xml.etree.ElementTree as Xml
@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urdfkin
-from tests.urdf.lint.cases.arm import arm
+from tests.urdf.lint.cases.arm import MESH, arm
 from urdfkin.robot import Robot
 from urdfkin.urdf.lint import Finding, Severity
 from urdfkin.validation.accuracy import judge
@@ -39,17 +39,14 @@ def test_a_follower_beside_an_undeclared_prefix_is_verified(more: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_judge_reads_a_file_with_an_undeclared_prefix() -> None:
+def test_the_judge_and_the_viewer_read_a_file_with_an_undeclared_prefix() -> None:
     with_prefix, without = (judge(load(arm(follow=FOLLOWS, more=more)), samples=2) for more in ("<d:x/>", ""))
     assert with_prefix.lines[0] == without.lines[0]
-
-
-def test_the_viewer_finds_the_shapes_of_a_file_with_an_undeclared_prefix() -> None:
     (shape,) = shapes(load(arm(base=SPHERE, more="<drake:x/>")))
     assert (shape.link, shape.kind) == ("base", "sphere")
 
 
-def test_each_undeclared_prefix_is_told_once_with_its_first_place_and_how_often_it_stands() -> None:
+def test_each_undeclared_prefix_is_told_once_with_its_first_place_and_xacro_as_xacro() -> None:
     more = '<a:x/><b:x/>\n  <a:y/><gazebo c:u="1" xmlns:d="http://d"/><d:z/>'
     found = told(arm(more=more))
     assert [(f.line, f.column, f.severity) for f in found] == [
@@ -59,6 +56,8 @@ def test_each_undeclared_prefix_is_told_once_with_its_first_place_and_how_often_
         (9, 45, Severity.WARNING),
     ]
     assert [f.found for f in found] == ['"<a:x>" and 1 more', '"<b:x>"', '"c:u"', '"<d:z>"']
+    found = urdfkin.check(arm(more='<xacro:leg prefix="left"/>'))
+    assert [finding.code for finding in found if finding.severity is not Severity.NOTE] == ["URDF202"]
 
 
 @pytest.mark.parametrize(
@@ -73,11 +72,6 @@ def test_each_undeclared_prefix_is_told_once_with_its_first_place_and_how_often_
 )
 def test_a_prefix_that_is_declared_is_not_told(more: str) -> None:
     assert told(arm(more=more)) == []
-
-
-def test_what_is_left_of_xacro_is_told_as_xacro_alone() -> None:
-    found = urdfkin.check(arm(more='<xacro:leg prefix="left"/>'))
-    assert [finding.code for finding in found if finding.severity is not Severity.NOTE] == ["URDF202"]
 
 
 PARTS = [
@@ -108,3 +102,41 @@ def test_it_is_told_whenever_readers_that_know_namespaces_refuse(parts: list[str
     except Xml.ParseError:
         refused = True
     assert bool(told(text)) == refused
+
+
+# -- remains of xacro ------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "text",
+    [
+        arm(base=MESH.format("package://tools/$(arg tool)/tool.stl")),
+        arm(base='<link name="base"><xacro:insert_block name="inertia"/></link>'),
+        arm(more='<gazebo><xacro:plugin/><p name="${x}"/></gazebo>'),
+    ],
+)
+def test_a_robot_whose_motion_needs_no_xacro_is_loaded_and_verified(text: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        robot = urdfkin.load(text)
+    robot.placement([0.1, 0.2], "tool")
+    assert robot.certificate().verified
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        arm(more="<xacro:arm/>"),
+        arm(inside="<xacro:limits/>"),
+        arm(axis='<axis xyz="${z}"/>'),
+        arm(limit='<limit lower="${low}" upper="1" effort="1" velocity="1"/>'),
+        arm(attributes='type="$(arg kind)"'),
+        arm(base='<link name="${side}_base"/>'),
+        arm(base=MESH.format("$(arg a)"), origin='<origin xyz="0 0 $(arg h)"/>'),
+    ],
+)
+def test_where_motion_depends_on_it_the_robot_is_refused(text: str) -> None:
+    (error,) = [f for f in urdfkin.check(text) if f.code == "URDF202" and f.severity is Severity.ERROR]
+    assert error.remedy is not None
+    assert "expand the file first" in error.remedy

@@ -1,0 +1,293 @@
+"""Mimic joints: rules are read twice, angles are the same doubles on both sides, samples keep limits."""
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Callable, Iterable
+
+import jsonschema
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import urdfkin
+from tests.reading import tree_of
+from tests.urdfs import chain, joint, limit, loaded, mimic
+from tests.urdfs import robot as robot_of
+from urdfkin.compiled.evaluate import placements
+from urdfkin.compiled.plan import compile_tree
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.configuration import draw, narrowed_ranges
+from urdfkin.model.tree import freed
+from urdfkin.report.html import as_html
+from urdfkin.robot import Robot
+from urdfkin.urdf.sources import Origin
+from urdfkin.validation.campaign import validate
+from urdfkin.validation.document import VALIDATION
+from urdfkin.validation.robot_summary import describe
+from urdfkin.verify.oracle import QueryBatch, rules_of_text
+
+pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+
+FAR = (1.0, 1e4, 1e8, 1e12, 1e15)
+
+
+def text(*rules: tuple[object, object]) -> str:
+    """A chain of continuous joints: j0 leads, each further one follows the one before by its rule."""
+    return followers([(i, *rule) for i, rule in enumerate(rules)], 'xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"')
+
+
+def followers(rules: Iterable[tuple[int, object, object]], origin: str = 'xyz="0.1 0.2 0.3"') -> str:
+    """Joint j0 moves; joint j(i+1) follows the joint of rule i's number, by its multiplier and offset."""
+    return chain(["", *(mimic(f"j{leader}", *rule) for leader, *rule in rules)], origin=origin)
+
+
+def misread(document: str, wrong: str) -> Robot:
+    """A robot whose own tree was read from `wrong` and which has Pinocchio check it against `document`."""
+    return Robot(tree_of(wrong.encode()), document, origin=Origin("<text>"))
+
+
+def test_a_multiplier_that_is_one_bit_off_is_caught_when_the_joint_has_turned_far() -> None:
+    right, wrong = text((3, 0)), text((float(np.nextafter(3.0, 4.0)), 0))
+    for q in (1e8, 1e12):
+        with pytest.raises(urdfkin.VerificationError):
+            misread(right, wrong).placement([q], "l2")
+        urdfkin.load(right).placement([q], "l2")
+
+
+@pytest.mark.parametrize(("q", "slip"), [(1e8, 1e-7), (1e12, 1e-3), (1e15, 0.5)])
+def test_an_offset_that_slipped_is_caught_when_the_joint_has_turned_far(q: float, slip: float) -> None:
+    robot = misread(text((3, 0)), text((3, slip)))
+    with pytest.raises(urdfkin.VerificationError):
+        robot.placement([q], "l2")
+    with pytest.raises(urdfkin.VerificationError):
+        robot.acceleration([q], [1.0], [1.0], "l2", "local")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("far", FAR)
+def test_chains_of_followers_are_verified_however_far_they_have_turned(far: float) -> None:
+    rng = np.random.default_rng(int(np.log10(far)))
+    for _ in range(5):
+        robot = urdfkin.load(text(*rng.normal(size=(4, 2)).tolist()))
+        q, v, a = rng.uniform(-far, far, (3, 20, 1))
+        robot.placement(q, robot.link_frames)
+        robot.jacobian(q, robot.link_frames)
+        robot.acceleration(q, v / far, a / far, robot.link_frames)
+        assert all(line.share < 0.3 for line in robot.certificate().lines)
+
+
+def test_no_kernel_fuses_the_multiplication_and_the_addition() -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(10):
+        m, c = rng.normal(size=2).tolist()
+        robot = urdfkin.load(text((m, c)), verify=False)
+        q = rng.uniform(-1e9, 1e9, (64, 1))
+        free = freed(robot.tree)
+        alone = placements(compile_tree(free, [2]), np.hstack((q, m * q + c)))[:, 0]
+        np.testing.assert_array_equal(robot.placement(q, "l2"), alone)
+        np.testing.assert_array_equal(robot.prepare("l2").placement(q[0]), alone[0])
+
+
+@pytest.mark.parametrize("exponent", [0, 3, 6, 7, 8, 12, 15, 22, 100, 300])
+def test_sine_and_cosine_are_right_to_the_last_digit_for_angles_of_any_size(exponent: int) -> None:
+    # What the bound grants a joint for both: one eps. An angle of 1e300 needs 1e300's digits of pi.
+    robot = urdfkin.load(text())
+    x = np.random.default_rng(exponent).uniform(1.0, 10.0, 60) * 10.0**exponent
+    level = urdfkin.load(text().replace('rpy="0.1 0.2 0.3"', ""), verify=False)
+    ours = level.placement(x[:, np.newaxis], "l1")
+    theirs = level.verifier.oracle().placements(QueryBatch(["l1"], (x[:, np.newaxis],)))[:, 0]
+    with mpmath.workdps(50 + exponent):
+        for k, angle in enumerate(x.tolist()):
+            true = mpmath.cos(mpmath.mpf(angle)), mpmath.sin(mpmath.mpf(angle))
+            for side in (ours, theirs):
+                for found, value in zip(side[k, :2, 0].tolist(), true, strict=True):
+                    assert abs(mpmath.mpf(found) - value) < 0.75 * EPS
+    robot.placement(x[:, np.newaxis], "l1")
+    assert robot.certificate().verified
+
+
+# -- rules that are read twice ---------------------------------------------------------------------
+
+
+numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
+
+
+@pytest.mark.slow
+@settings(max_examples=60)
+@given(data=st.data(), n=st.integers(1, 5))
+def test_chains_of_followers_end_at_the_same_joint_with_the_same_rule(data: st.DataObject, n: int) -> None:
+    rules = [(data.draw(st.integers(0, i)), data.draw(numbers), data.draw(numbers)) for i in range(n)]
+    text = followers(rules)
+    theirs = rules_of_text(text, {f"j{i}" for i in range(n + 1)})
+    ours = {joint.name: joint.mimic for joint in tree_of(text.encode()).joints if joint.mimic}
+    assert theirs == ours  # the same doubles
+    angles = [0.7]  # by the rules themselves, one after the other
+    for i, (leader, multiplier, offset) in enumerate(rules, start=1):
+        angles.append(multiplier * angles[leader] + offset)
+        for rule in (theirs[f"j{i}"], ours[f"j{i}"]):
+            assert rule.leader == "j0"
+            assert rule.multiplier * 0.7 + rule.offset == pytest.approx(angles[i], abs=1e-12)
+
+
+TEXT = followers([(0, 1.5, 0.2), (1, -0.5, 0.1), (0, 2.0, 0.0)])
+
+MISREAD: list[tuple[str, Callable[[str], str]]] = [
+    ("a multiplier", lambda text: text.replace("1.5", "1.500000001")),
+    ("an offset in the middle of a chain", lambda text: text.replace('"0.2"', '"0.2000000001"')),
+    ("whom it follows", lambda text: text.replace('<mimic joint="j1"', '<mimic joint="j0"')),
+    ("a rule that was lost", lambda text: re.sub('<mimic joint="j0" multiplier="2.0"[^>]*>', "", text)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("what", "misread"), MISREAD)
+def test_a_rule_that_urdfkin_misreads_is_not_verified(what: str, misread: Callable[[str], str]) -> None:
+    robot = Robot(tree_of(misread(TEXT).encode()), TEXT, origin=Origin("<text>"))
+    assert misread(TEXT) != TEXT, what
+    if robot.nq > 1:
+        other_coordinates_are_found(robot)
+        return
+    with pytest.raises(urdfkin.VerificationError):
+        robot.placement([0.7], "l4")
+    with pytest.raises(urdfkin.VerificationError):
+        robot.jacobian([0.7], "l4")
+
+
+def other_coordinates_are_found(robot: Robot) -> None:
+    with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds other coordinates .*: found j3"):
+        robot.placement(robot.neutral(), "l4")
+    assert not robot.certificate().verified
+
+
+def test_a_reader_that_loses_every_rule_is_not_verified() -> None:
+    # Only the user's own mimic=False frees the followers: a tree without any says nothing.
+    robot = Robot(tree_of(TEXT.encode(), mimic=False), TEXT, origin=Origin("<text>"))
+    with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds other coordinates"):
+        robot.placement(robot.neutral(), "l4")
+    free = urdfkin.load(TEXT, mimic=False)
+    free.placement([0.1, 0.2, 0.3, 0.4], "l4")
+    assert free.certificate().verified
+
+
+def test_joints_in_another_order_and_a_coordinate_of_another_joint_are_found() -> None:
+    text = robot_of(joint("x", "continuous", "a", "b"), joint("y", "continuous", "a", "c"))
+    tree = tree_of(text.replace('"x"', '"z"').encode())  # read so, x stands after y
+    for one in tree.joints:
+        if one.name == "z":
+            object.__setattr__(one, "name", "x")
+    robot = Robot(tree, text, origin=Origin("<text>"))
+    assert robot.joint_names == ("y", "x")
+    with pytest.warns(urdfkin.NotVerifiedWarning, match="other joints .* found the same in another order"):
+        robot.placement([0.1, 0.2], "b")
+    # Both sides once took from the tree which number of q is whose.
+    robot = urdfkin.load("ur5")
+    first, second, *_ = (i for i, joint in enumerate(robot.tree.joints) if joint.nq)
+    places = list(robot.tree.q_index)
+    places[first], places[second] = places[second], places[first]
+    robot.tree.__dict__["q_index"] = tuple(places)
+    with pytest.raises(urdfkin.VerificationError):
+        robot.placement(np.arange(6.0), "tool0")
+
+
+# -- limits ----------------------------------------------------------------------------------------
+
+
+def gripper(kind: str, bounds: tuple[float, float], *rules: tuple[float, float, float, float]) -> Robot:
+    """A leader with bounds and followers, each (multiplier, offset, lower, upper)."""
+    joints = [joint("leader", kind, "l0", "l1", more=limit(*bounds))]
+    for i, (multiplier, offset, *own) in enumerate(rules, 1):
+        more = limit(*own) + mimic("leader", multiplier, offset)
+        joints.append(joint(f"f{i}", "revolute", f"l{i}", f"l{i + 1}", more=more))
+    return loaded(robot_of(*joints))
+
+
+#: As the fingers of a hand of which one mirrors the other.
+MIRRORED = ("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
+
+
+@pytest.mark.parametrize("multiplier", [5.0, -5.0, 1e-3, 1.0 / 3.0, 7e3])
+@pytest.mark.parametrize("offset", [0.0, 0.7, -1.0, 900.0])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "continuous"])
+def test_a_leader_stays_where_its_follower_keeps_its_limits(
+    kind: str, offset: float, multiplier: float
+) -> None:
+    middle = 0.3 * multiplier + offset  # where the follower stands with its leader at 0.3
+    robot = gripper(kind, (-1.0, 1.0), (multiplier, offset, middle - 0.2, middle + 0.9))
+    drawn = robot.sample(2000)
+    assert robot.limit_violations(drawn) == []
+    reached = np.ptp(drawn)
+    wanted = min(1.1 / abs(multiplier), 2.0)
+    assert reached >= 0.4 * wanted, "the range that is left is used"
+
+
+def test_a_validation_covers_the_files_limits_and_a_continuous_leader_any_angle() -> None:
+    robot = gripper(*MIRRORED)
+    drawn = draw(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
+    assert drawn[1:3].tolist() == [[-0.005], [0.055]]
+    assert np.ptp(drawn[3:]) > 0.059
+    assert np.ptp(robot.sample(2000)) <= 0.01
+    robot = gripper("continuous", (0.0, 0.0))
+    assert np.ptp(robot.sample(1000)) > 1.99 * math.pi
+
+
+@pytest.mark.slow
+def test_info_the_data_and_the_report_say_what_mimic_joints_leave_of_a_range() -> None:
+    robot = gripper(*MIRRORED)
+    said = "joint leader ranges over -0.005 to 0.055 m; its mimic joints keep their limits from -0.005 to "
+    assert f"{said}0.005 only (f1)" in robot._sheet().text()
+    kept = [joint["kept"] for joint in describe(robot)["joints"]]
+    assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
+    (none,) = narrowed_ranges(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)
+    assert str(none).endswith("no value keeps all its mimic joints within their limits (f1)")
+    robot = gripper(*MIRRORED)
+    document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
+    jsonschema.validate(document, VALIDATION.schema())
+    page = as_html(document)
+    assert "leader: its mimic joints are within limits only from -0.005 to 0.005 m (f1)." in page
+    assert "URDF527" in page
+
+
+@pytest.mark.slow
+@settings(max_examples=100)
+@given(
+    st.floats(-3.0, 3.0), st.floats(1e-3, 3.0),
+    st.lists(st.tuples(st.floats(-9.0, 9.0), st.floats(-2.0, 2.0), st.floats(0.01, 1.0)), max_size=3),
+)  # fmt: skip
+def test_any_followers_keep_their_limits_where_there_is_room(
+    lower: float, width: float, rules: list[tuple[float, float, float]]
+) -> None:
+    middle = lower + 0.5 * width
+    followers = [(m, o, m * middle + o - half, m * middle + o + half) for m, o, half in rules]
+    robot = gripper("prismatic", (lower, lower + width), *followers)
+    assert robot.limit_violations(robot.sample(50)) == []
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [(1.0, 0.0, 3.0, 4.0), (-1.0, 0.0, 1.0, 4.0), (0.0, 5.0, -1.0, 1.0)],
+    ids=["no common place", "one common point", "a constant outside"],
+)
+def test_where_there_is_no_room_the_leader_keeps_its_own_limits_and_the_follower_is_named(
+    rule: tuple[float, float, float, float],
+) -> None:
+    robot = gripper("revolute", (-1.0, 1.0), rule)
+    q = robot.sample(500)
+    assert -1.0 <= q.min() < -0.9
+    assert 0.9 < q.max() <= 1.0
+    (line,) = robot.limit_violations(q)
+    assert line.startswith("joint f1")
+
+
+DIGESTS = {
+    "panda": "42521fd4b67c65a0", "ur5": "cb6bde16c9b2a8f9", "talos": "a2bb0559f21907f0",
+    "anymal": "a4048fddd35247c6",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DIGESTS)
+def test_a_seed_gives_the_numbers_it_gave_before_where_followers_cut_nothing(name: str) -> None:
+    drawn = urdfkin.load(name).sample(20, seed=3)
+    assert hashlib.sha256(drawn.tobytes()).hexdigest()[:16] == DIGESTS[name]

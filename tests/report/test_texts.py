@@ -1,0 +1,100 @@
+"""A report in Markdown and on a terminal: whole tables, no name that acts, never too long or too wide."""
+
+import copy
+import io
+from typing import Any
+
+import pytest
+from markdown_it import MarkdownIt
+from rich.console import Console
+
+from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile
+from urdfkin.errors.escape import markdown_code, markdown_text
+from urdfkin.report.compare import compare, document
+from urdfkin.report.listing import print_document
+from urdfkin.report.markdown import LIMIT, as_markdown, fenced
+from urdfkin.report.terminal import print_report
+from urdfkin.validation.document import Document
+
+GITHUB_LIMIT = 65_536
+
+
+def rendered(markdown: str) -> str:
+    return str(MarkdownIt("commonmark", {"html": True}).enable("table").render(markdown))
+
+
+def test_failures_come_first_in_markdown_and_a_good_run_has_the_line_that_repeats_it() -> None:
+    html = rendered(as_markdown(arms()))
+    assert html.count("<tr>") == 3
+    assert "✅ Verified against Pinocchio" in html
+    assert "urdfkin validate panda ur5 --samples 6 --seed 0" in html
+    markdown = as_markdown(failing())
+    assert markdown.index("broken.urdf") < markdown.index("| `ur5`")
+    assert "❌ Not verified" in markdown
+    assert "3 of" in markdown
+    assert "urdfkin velocity panda --frame" in markdown
+
+
+def test_names_and_prose_stay_such_in_markdown_and_a_fence_is_longer_than_what_it_holds() -> None:
+    assert markdown_code(HOSTILE_ROBOT) in as_markdown(hostile())
+    shown = rendered(markdown_text("a|b `c` *d* <e> @f #g [h](i)")).strip().replace("\u2060", "")
+    assert shown == "<p>a|b `c` *d* &lt;e&gt; @f #g [h](i)</p>"
+    assert fenced("a ``` b").startswith("````sh\n")
+
+
+@pytest.mark.slow
+def test_a_thousand_robots_still_fit_a_comment_and_the_rest_is_counted() -> None:
+    document = arms()
+    document["robots"] = [copy.deepcopy(document["robots"][0]) for _ in range(1000)]
+    markdown = as_markdown(document)
+    assert len(markdown) <= LIMIT < GITHUB_LIMIT
+    assert "further robots left out" in markdown
+
+
+def printed(document: Document, width: int, **how: Any) -> str:
+    stream = io.StringIO()
+    print_report(document, Console(file=stream, width=width, markup=False, highlight=False), **how)
+    return stream.getvalue()
+
+
+def one(document: Document) -> Document:
+    document["robots"] = document["robots"][:1]
+    return document
+
+
+@pytest.mark.parametrize("width", [80, 100, 140])
+@pytest.mark.parametrize("make", [arms, failing, hostile, lambda: one(arms())])
+def test_no_line_but_a_replay_line_is_wider_than_the_terminal(make: Any, width: int) -> None:
+    lines = printed(make(), width).splitlines()
+    assert [line for line in lines if len(line) > width and "urdfkin" not in line] == []
+
+
+def test_without_a_terminal_there_is_no_escape_no_markup_and_no_colour() -> None:
+    assert "\x1b" not in printed(arms(), 80)
+    named = arms()
+    named["robots"][0]["source"] = "[bold red]name[/]"
+    assert "[bold" in printed(named, 80)
+    stream = io.StringIO()
+    old, new = arms(), failing()
+    print_document(Console(file=stream, width=80, markup=False), document(old, new, compare(old, new)))
+    text = stream.getvalue()
+    assert "REGRESSION panda: verdict: verified -> disagrees" in text
+    assert "regressions" in text.splitlines()[-1]
+
+
+def test_80_columns_have_a_row_and_100_a_column_for_each_quantity() -> None:
+    text = printed(arms(), 80)
+    for words in ("panda", "ur5", "Jacobian rate", "acceleration", "data.J", "verified"):
+        assert words in text
+    head = next(line for line in printed(arms(), 100).splitlines() if "robot" in line and "results" in line)
+    for word in ("place", "vel", "J", "J-dot", "acc", "data.J", "verdict"):
+        assert word in head
+
+
+def test_failures_come_with_their_replay_line_and_reasons_are_told() -> None:
+    text = printed(failing(), 80)
+    assert "urdfkin velocity panda --frame" in text
+    assert "broken.urdf: bad input" in text
+    assert "URDF502" in text
+    assert "urdfkin velocity panda --frame" not in printed(arms(), 80)
+    assert "urdfkin velocity panda --frame" in printed(arms(), 80, cases=True)

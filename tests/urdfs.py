@@ -1,0 +1,56 @@
+"""Small URDF texts, written joint by joint: a test states what its robot is, and not its XML."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterable
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import urdfkin
+from urdfkin.robot import Robot
+
+
+def limit(lower: object = -1, upper: object = 1) -> str:
+    """Limits, with an effort and a velocity of 1."""
+    return f'<limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/>'
+
+
+def mimic(leader: str, multiplier: object = 1, offset: object = 0) -> str:
+    return f'<mimic joint="{leader}" multiplier="{multiplier}" offset="{offset}"/>'
+
+
+def joint(
+    name: str, kind: str, parent: str, child: str, origin: str = "", axis: str = "0 0 1", more: str = ""
+) -> str:
+    """A joint; `origin` has the attributes of its origin, `more` its other elements."""
+    inside = f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
+    inside += f"<origin {origin}/>" * bool(origin) + f'<axis xyz="{axis}"/>' * bool(axis) + more
+    return f'<joint name={quoteattr(name)} type="{kind}">{inside}</joint>'
+
+
+def robot(*joints: str, name: str = "r", attributes: str = "") -> str:
+    """The joints with the links that they name, in the order in which they name them."""
+    links = dict.fromkeys(re.findall(r"<(?:parent|child) (link=(?:\"[^\"]*\"|'[^']*'))/>", "".join(joints)))
+    named = "".join(f"<{link.replace('=', ' name=', 1)}/>" for link in links)
+    return f"<robot name={quoteattr(name)} {attributes}>{named}{''.join(joints)}</robot>"
+
+
+def chain(
+    inside: Iterable[str],
+    kind: str = "continuous",
+    origin: str = 'xyz="0.1 0.2 0.3"',
+    axis: str = "0 0 1",
+    **how: Any,
+) -> str:
+    """Links l0, l1, ... in a chain, with a joint j0, j1, ... for each text, which stands inside the joint."""
+    parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", origin, axis, x) for i, x in enumerate(inside)]
+    return robot(*parts, **how)
+
+
+def loaded(text: str, **how: Any) -> Robot:
+    """The robot of a text whose warnings are no matter."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(text, **how)
