@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import shlex
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -11,6 +14,7 @@ import pinocchio as pin
 import pytest
 
 import urdfkin
+from tests.cli.running import urdfkin as urdfkin_command
 from tests.pages import DOCS, blocks, pages, run
 from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
@@ -21,18 +25,66 @@ Q, V, A = np.array([np.pi / 2.0, 0.5]), np.array([2.0, 0.3]), np.zeros(2)
 
 #: Pages whose blocks other tests run, or that need what a test must not have.
 ELSEWHERE = {
-    "calibration.md": "tests/calibration/test_page.py",
     "check.md": "tests/cli/test_check_in_a_repository.py",
-    "tour.md": "tests/test_tour.py",
-    "dh-at-work.md": "tests/dh/test_at_work_page.py",
     "dh.md": "tests/cli/test_dh.py",
     "enclosures.md": "tests/verify/exact/test_enclosure.py",
     "campaigns.md": "a scheduler on another machine",
 }
 
 
+#: Pages that show files, and programs that are run on their own.
+WITH_FILES = {"calibration.md": pytest.mark.slow, "dh-at-work.md": pytest.mark.long}
+#: The first line of a file that a page shows has its name, as a comment of whatever kind.
+NAMED = re.compile(r"\A(?:#|%|<!--)\s*(\S+\.\w+)")
+
+
 def runs(page: str) -> bool:
-    return any(kind in ("python", "console") for kind, _ in blocks(page)) and page not in ELSEWHERE
+    shown = any(kind in ("python", "console") for kind, _ in blocks(page))
+    return shown and page not in ELSEWHERE and page not in WITH_FILES
+
+
+def loose(text: str) -> str:
+    """Without the blanks at the ends of lines."""
+    return re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
+
+
+def pattern(shown: str) -> re.Pattern[str]:
+    """Output as a page shows it: `...` stands for anything."""
+    return re.compile(".*?".join(map(re.escape, loose(shown).strip("\n").split("..."))), re.DOTALL)
+
+
+@pytest.mark.parametrize("page", [pytest.param(page, marks=mark) for page, mark in WITH_FILES.items()])
+def test_every_example_of_a_page_with_files_prints_what_it_shows(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "160")
+    ran = 0
+    for kind, text in blocks(page):
+        named = NAMED.match(text)
+        if named:
+            Path(named[1]).write_text(text, "utf-8")
+        if kind == "console":
+            for example in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
+                command, _, shown = example.partition("\n")
+                words, _, file = command.partition(" > ")
+                done = urdfkin_command(*shlex.split(words)[1:])
+                refused = shown.startswith("urdfkin: error")
+                assert done.code == 3 * refused or page != "calibration.md", (command, done.err)
+                if file:
+                    Path(file).write_text(done.text, "utf-8")
+                else:
+                    printed = loose(done.err if refused else done.text + done.err)
+                    assert pattern(shown).search(printed), f"{command}\n{printed}"
+                ran += 1
+        elif kind == "python":
+            program = [sys.executable, "-W", "error", "-c", text]
+            alone = subprocess.run(program, capture_output=True, text=True, check=False)
+            assert alone.returncode == 0, alone.stderr
+        else:
+            assert named, f"a block of {page} is not run: {text}"
+    assert ran >= 6
+    assert not Path("no.urdf").exists()
 
 
 SLOW = {"same.md": pytest.mark.slow}

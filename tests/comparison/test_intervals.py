@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 import urdfkin
 from tests.comparison import pairs
-from tests.comparison.pairs import robot
+from tests.comparison.pairs import changed, robot
 from tests.comparison.searching import far, searched
-from urdfkin.model.mechanisms.mechanism import Screw, along
-from urdfkin.model.mechanisms.upper_bound import Grid, point
+from urdfkin.comparison.bounds import Boxes, Search, curvature, moved_together, tightened
+from urdfkin.comparison.certificate import certificate, recheck
+from urdfkin.comparison.result import Verdict
+from urdfkin.comparison.verdict import Comparator
+from urdfkin.model.mechanisms.matcher import align
+from urdfkin.model.mechanisms.mechanism import FramePair, Screw, along, variables_of
+from urdfkin.model.mechanisms.upper_bound import FINE, Grid, point, upper_bounds
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 
@@ -81,3 +90,191 @@ def test_a_frame_that_slides_without_end_has_no_bound() -> None:
     assert worst is not None
     assert worst.frame == "c"
     assert math.isinf(worst.upper)
+
+
+# -- branch and bound: its second derivatives are bounds, and it proves what no sum of differences can -------
+
+
+#: Robots, changes, frames: turns alone, a slide, followers, an axis that alone is bent.
+BOXES = [
+    ("panda", "rounded", "panda_hand_tcp"),
+    ("panda", "rounded", "panda_leftfinger"),
+    ("ur3_gripper", "tilted by 0.01", "wrist_3_link"),
+    ("elbow", "axis bent", "tool"),
+    ("panda", "other rule", "panda_rightfinger"),
+    ("so100", "rounded", "jaw"),
+]
+
+
+def searched_boxes(name: str, what: str, link: str) -> tuple[Search, FramePair]:
+    b = changed(name, what)
+    assert b is not None
+    return laid(robot(name), b, link)
+
+
+def laid(a: urdfkin.Robot, b: urdfkin.Robot, link: str) -> tuple[Search, FramePair]:
+    judge = Comparator((a, b), {}, bounds=True)
+    found = align(*judge.mechanisms, {})
+    frame = next(one for one in found.frames if a.tree.links[one.a] == link)
+    return judge.search(found, variables_of(found, judge.tolerance)), frame
+
+
+def hold_against_differences(search: Search, frame: FramePair, names: Sequence[str], M: FloatArray) -> None:
+    """Bounds M on second derivatives against difference quotients of the first ones."""
+    boxes = Boxes(search, frame, names)
+    c, step = search.random(200)[:, boxes.at], 1e-3
+    largest = np.zeros_like(M)
+    for i in range(len(names)):
+        h = step * np.eye(len(names))[i]
+        D, G = boxes.at_middles(c)
+        ahead, behind = boxes.at_middles(c + h), boxes.at_middles(c - h)
+        slope = (ahead[0] - behind[0]) / (2.0 * step)
+        size = np.abs(G).max() + np.abs(D).max()
+        assert np.abs(slope - G[..., i]).max() <= 1e-5 * size + 1e-12
+        largest[i] = np.linalg.norm((ahead[1] - behind[1]) / (2.0 * step), axis=1).max(axis=0)
+    assert (largest <= M + 1e-11).all()
+    assert M.max() <= 10.0 * largest.max()
+
+
+def two_joints(elbow: str, multiplier: float | None) -> urdfkin.Robot:
+    """An arm whose second joint stands at an origin, and follows the first one if there is a multiplier."""
+    follows = "" if multiplier is None else f'<mimic joint="j1" multiplier="{multiplier}"/>'
+    reach = 3.0 * max(1.0, abs(multiplier or 0.0))
+    limit = f'<limit lower="{-reach}" upper="{reach}" effort="1" velocity="1"/>'
+    return urdfkin.load(
+        f"""<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
+        <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+        <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+        <joint name="j2" type="revolute"><parent link="upper"/><child link="fore"/><origin {elbow}/>
+        <axis xyz="0 1 0"/>{limit}{follows}</joint>
+        <joint name="mount" type="fixed"><parent link="fore"/><child link="tool"/><origin xyz="1 0 0"/>
+        </joint></robot>"""
+    )
+
+
+@pytest.mark.parametrize("multiplier", [None, 5.0, -0.25])
+@pytest.mark.parametrize(
+    "elbow",
+    ['xyz="1.01 0.02 0" rpy="0.01 0 0.02"', 'xyz="1.5 0 0.3"', 'xyz="1 0 -0.9"', 'xyz="1 0 0" rpy="0.5 0 0"'],
+)
+def test_second_derivatives_are_bounded_for_tilted_and_for_parallel_axes_and_followers(
+    elbow: str, multiplier: float | None
+) -> None:
+    a, b = two_joints('xyz="1 0 0"', multiplier), two_joints(elbow, multiplier)
+    search, frame = laid(a, b, "tool")
+    steps, some = moved_together(search.found, search.variables, frame)
+    names, M = curvature(steps, [one for one in some if one is not None], search.variables, frame)
+    assert np.isfinite(M).all()
+    hold_against_differences(search, frame, names, M)
+
+
+def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() -> None:
+    s = 0.01
+
+    def arm(slide: str) -> urdfkin.Robot:
+        limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+        return urdfkin.load(
+            f"""<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
+            <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+            {limit}</joint>
+            <joint name="j2" type="prismatic"><parent link="upper"/><child link="fore"/><origin {slide}/>
+            <axis xyz="1 0 0"/>{limit}<mimic joint="j1"/></joint>
+            <joint name="j3" type="revolute"><parent link="fore"/><child link="tool"/><axis xyz="0 1 0"/>
+            {limit}</joint></robot>"""
+        )
+
+    search, frame = laid(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
+    upper = upper_bounds(search.found, search.variables, frame, FINE)[0]
+    attained = s * np.sqrt(2.0)
+    assert search.worst([frame])[0][0] == pytest.approx(attained, rel=0.01)
+    # What boxes prove is no less than what is attained, also where less would be enough.
+    assert tightened(search, frame, 1.01 * s, upper) >= 0.99 * attained
+
+
+def test_joints_that_follow_by_other_multipliers_have_no_bound_on_second_derivatives() -> None:
+    search, frame = laid(two_joints('xyz="1 0 0"', 0.5), two_joints('xyz="1 0 0"', 0.6), "tool")
+    steps, some = moved_together(search.found, search.variables, frame)
+    _, M = curvature(steps, [one for one in some if one is not None], search.variables, frame)
+    assert np.isinf(M).all()
+
+
+@pytest.mark.parametrize("variables", [1, 2, 5])
+def test_the_first_derivatives_bound_of_a_box_is_no_less_than_its_corners(variables: int) -> None:
+    rng = np.random.default_rng(variables)
+    D, G = rng.normal(size=(50, 3)), rng.normal(size=(50, 3, variables))
+    D[0] = 0.0
+    h = rng.uniform(0.1, 2.0, variables)
+    boxes = cast(Boxes, SimpleNamespace(at_middles=lambda c: (D, G)))
+    bound = Boxes.bounds(boxes, np.zeros((50, variables)), h)
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=variables)))
+    corners = np.linalg.norm(D[:, np.newaxis] + np.einsum("nij,sj->nsi", G, signs * h), axis=-1).max(axis=1)
+    assert (bound >= corners * (1.0 - 1e-12)).all()
+    along = (
+        np.abs((D[:, :, np.newaxis] * G).sum(axis=1)) / np.maximum(np.linalg.norm(D, axis=1), 1e-300)[:, None]
+    )
+    size = np.linalg.norm(D, axis=1) + along @ h
+    assert (bound <= np.linalg.norm(D, axis=1) + np.linalg.norm(G, axis=1) @ h + 1e-12).all()
+    assert (bound >= size).all()
+    if variables == 1:
+        np.testing.assert_allclose(bound, corners, rtol=1e-12)
+
+
+@pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.3)])
+def test_a_tools_point_moves_as_its_jacobian_says(tool: tuple[float, float, float]) -> None:
+    arm, none = robot("panda"), cast(Boxes, None)  # the point depends on no box
+    q, step = arm.sample(5, seed=1), 1e-6
+    p, J = Boxes._origin(none, arm, q, "panda_hand", np.array(tool))
+    expected = arm.placement(q, "panda_hand") @ [*tool, 1.0]
+    np.testing.assert_allclose(p, expected[:, :3], atol=1e-14)
+    for i, h in enumerate(step * np.eye(arm.nv)):
+        ahead, behind = (Boxes._origin(none, arm, x, "panda_hand", np.array(tool))[0] for x in (q + h, q - h))
+        np.testing.assert_allclose((ahead - behind) / (2.0 * step), J[..., i], atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "what", "link"), BOXES)
+def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, link: str) -> None:
+    search, frame = searched_boxes(name, what, link)
+    steps, some = moved_together(search.found, search.variables, frame)
+    pairs = [pair for pair in some if pair is not None]
+    names, M = curvature(steps, pairs, search.variables, frame)
+    if not np.isfinite(M).all():
+        assert what == "other rule"
+        return
+    hold_against_differences(search, frame, names, M)
+
+
+@pytest.mark.slow
+def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> None:
+    search, frame = searched_boxes("panda", "rounded", "panda_hand_tcp")
+    lower, _ = search.worst([frame])[0]
+    upper, _ = upper_bounds(search.found, search.variables, frame, FINE)
+    assert upper > 1.6 * lower
+    assert tightened(search, frame, 1.05 * lower, upper) == 1.05 * lower
+    assert tightened(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"
+    assert tightened(search, frame, 1.05 * lower, upper, most=0) == upper
+
+
+@pytest.mark.slow
+def test_what_boxes_prove_is_proven_again() -> None:
+    a, b = robot("so100"), changed("so100", "rounded")
+    assert b is not None
+    plain, found = urdfkin.same(a, b, boxes=0), urdfkin.same(a, b)
+    assert plain.worst is not None
+    assert found.worst is not None
+    assert found.worst.lower == plain.worst.lower
+    assert found.worst.upper <= plain.worst.upper
+    assert recheck(certificate(found), a, b) == []
+
+
+def test_of_robots_that_nothing_moves_the_distance_is_told_too() -> None:
+    text = (
+        '<robot name="r"><link name="base"/><link name="mount"/>'
+        '<joint name="j" type="fixed"><parent link="base"/><child link="mount"/>'
+        '<origin xyz="0.3 {} 0"/></joint></robot>'
+    )
+    found = urdfkin.same(text.format(0), text.format(0.004))
+    assert found.verdict is Verdict.SAME_AFTER  # as a tool frame it may lie elsewhere; as written it does
+    assert found.worst_as_written is not None
+    assert found.worst_as_written.lower == pytest.approx(0.004, rel=1e-9)
+    assert 0.004 <= found.worst_as_written.upper <= 0.00402

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ from hypothesis import strategies as st
 from tests.dh.arms import arm
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh import DHTable, dh_table
-from urdfkin.dh.snapping import rotation_angle
+from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
+from urdfkin.dh.table import SnapChange, SnapReport
 from urdfkin.model.chain import chain
-from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -128,3 +130,113 @@ def test_snapping_touches_no_angle_beyond_its_tolerance() -> None:
     assert table.rows[0].alpha == pytest.approx(math.pi / 2 + 2e-3)
     assert table.snap is not None
     assert table.snap.changes == ()
+
+
+# -- the bound of a snapped table, number for number: each angle times the way from its pivot to the tip -----
+
+
+OFF = 1e-5
+
+
+def test_a_change_moves_the_tip_by_its_angle_times_its_lever() -> None:
+    assert SnapChange(0, "origin of a", 1e-3, 4.0).tip == 4e-3
+    assert SnapChange(0, "origin of a", 1e-3, 0.0).tip == 0.0
+
+
+def test_an_angle_at_the_first_joint_is_seen_along_the_whole_way_and_one_at_the_last_along_the_rest() -> None:
+    quarter = math.pi / 2
+    for tilts, lever in [((OFF, 0.0), 3.0 + 0.5), ((0.0, OFF), 0.5)]:
+        tree = arm(
+            np.eye(4),
+            shift(0, 0, 1.0) @ rotation("x", quarter + tilts[0]),
+            shift(3.0, 0, 0) @ rotation("x", quarter + tilts[1]),
+            tip=shift(0, 0.5, 0),
+        )
+        snap = dh_table(tree, "tip", snap=10 * OFF).snap
+        assert snap is not None
+        assert snap.radians == pytest.approx(OFF, rel=1e-9)
+        assert snap.metres == pytest.approx(OFF * lever, rel=1e-9)
+        assert 0.0 < snap.measured_metres <= snap.metres
+
+
+@pytest.mark.parametrize("beyond", [0.0, 3.0])
+def test_an_angle_made_of_two_fixed_ones_is_seen_from_the_joint_behind_it(beyond: float) -> None:
+    """Neither origin is nearly round, both together are."""
+    z = np.array([0.0, 0.0, 1.0])
+    joints = [
+        (Joint("a", JointKind.REVOLUTE, 0, np.eye(4), z), "l0", "l1"),
+        (Joint("bolt", JointKind.FIXED, 0, rotation("x", 0.3), z), "l1", "l2"),
+        (Joint("b", JointKind.REVOLUTE, 0, rotation("x", math.pi / 2 - 0.3 + OFF), z), "l2", "l3"),
+        (Joint("c", JointKind.REVOLUTE, 0, shift(beyond, 0, 0), z), "l3", "l4"),
+        (Joint("end", JointKind.FIXED, 0, shift(0, 0.5, 0), z), "l4", "tip"),
+    ]
+    snap = dh_table(build_tree("bolted", "l0", joints), "tip", snap=10 * OFF).snap
+    assert snap is not None
+    assert [change.lever for change in snap.changes] == [pytest.approx(beyond + 0.5)]
+    assert snap.metres == pytest.approx(OFF * (beyond + 0.5), rel=1e-9)
+    assert 0.0 < snap.measured_metres <= snap.metres
+
+
+def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
+    """A tilt before a joint that turns, then one that slides, then 2 m to the tip."""
+    z = np.array([0.0, 0.0, 1.0])
+    joints = [
+        (Joint("a", JointKind.REVOLUTE, 0, rotation("x", math.pi / 2 + tilt), z), "l0", "l1"),
+        (Joint("b", JointKind.PRISMATIC, 0, rotation("y", math.pi / 2), z, limit), "l1", "l2"),
+        (Joint("end", JointKind.FIXED, 0, shift(0, 0, 2.0), z), "l2", "tip"),
+    ]
+    return build_tree("sliding", "l0", joints)
+
+
+@pytest.mark.parametrize(
+    ("limit", "travel"), [(None, 1.0), (Limit(-0.5, 3.0, 1.0, 1.0), 3.0), (Limit(-4.0, 3.0, 1.0, 1.0), 4.0)]
+)
+def test_the_travel_of_what_slides_lengthens_the_lever(limit: Limit | None, travel: float) -> None:
+    snap = dh_table(sliding(limit), "tip", snap=10 * OFF).snap
+    assert snap is not None
+    assert snap.per_metre == {"b": pytest.approx(OFF, rel=1e-9)}
+    assert snap.metres == pytest.approx(OFF * (2.0 + travel), rel=1e-9)
+    assert snap.bound({"b": np.array([0.0, -5.0])}) == pytest.approx([2.0 * OFF, 7.0 * OFF], rel=1e-9)
+
+
+def test_a_statement_adds_up_what_is_said_of_each_change() -> None:
+    changes = (SnapChange(1, "x", 1e-3, 2.0, ("s",)), SnapChange(-1, "y", 2e-3, 5.0))
+    said = SnapReport(1e-2, changes, 0.0, 0.0, {"s": 1e-3})
+    assert said.rows == (-1, 1)
+    assert said.bound({"s": np.array([0.0, -10.0])}) == pytest.approx([0.012, 0.022])
+
+
+def test_what_several_changes_move_for_each_metre_of_a_slider_adds_up() -> None:
+    tree = arm(
+        rotation("x", math.pi / 2 + OFF), shift(1.0, 0, 0) @ rotation("x", math.pi / 2 + 2 * OFF), kinds="RP"
+    )
+    snap = dh_table(tree, "tip", snap=10 * OFF).snap
+    assert snap is not None
+    assert snap.per_metre == {"j2": pytest.approx(3 * OFF, rel=1e-9)}
+
+
+@pytest.mark.parametrize("psi", [-2.5, -0.4, 0.3, 1.1, 3.0])
+@pytest.mark.parametrize("tilt", [0.0, OFF, math.pi - OFF, math.pi, 1.0])
+def test_a_pose_that_is_snapped_turns_by_no_more_than_is_said(tilt: float, psi: float) -> None:
+    A = shift(1, 2, 3) @ rotation("z", 0.7) @ rotation("x", tilt) @ rotation("z", psi)
+    pose, angle = _snap_pose(A, 10 * OFF)
+    assert angle <= 2 * OFF
+    assert rotation_angle(pose[:3, :3], A[:3, :3]) <= max(angle, 1e-12)
+    assert (pose[:3, 3] == [1, 2, 3]).all()
+
+
+@pytest.mark.parametrize(("convention", "row"), [("standard", 0), ("modified", 1)])
+def test_a_constant_shows_in_the_row_of_its_convention(convention: str, row: int) -> None:
+    tree = arm(np.eye(4), shift(0.3, 0, 0) @ rotation("x", 1.0), tip=shift(0.1, 0.2, 0) @ rotation("y", 0.3))
+    table = dh_table(tree, "tip", convention=convention)
+    assert [row_of_constant(table, k) for k in range(3)] == [-1, row, 2]
+    plain = replace(table, tool=np.eye(4))
+    assert [row_of_constant(plain, k) for k in range(3)] == [-1, row, 1]
+
+
+@pytest.mark.parametrize(("pivot", "sliders"), [(0, "j1 j3"), (1, "j1 j3"), (2, "j3"), (3, "j3"), (4, "")])
+def test_the_joints_that_slide_from_the_pivot_on_lengthen_a_lever(pivot: int, sliders: str) -> None:
+    path = chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
+    found = _change(path, pivot, "something", OFF)
+    assert found.sliders == tuple(sliders.split())
+    assert found.lever == pytest.approx({0: 7.0, 1: 7.0, 2: 6.0, 3: 4.0, 4: 0.0}[pivot])

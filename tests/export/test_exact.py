@@ -1,19 +1,37 @@
-"""Exact code for SymPy is algebra without a double, and equals the chain of the URDF's decimals."""
+"""Exact code is algebra without a double; what an export rounds, by its own expressions."""
 
 from __future__ import annotations
 
+import ctypes
+import math
+import operator
+import re
+import shutil
+import subprocess
 import warnings
+from collections.abc import Callable
 from fractions import Fraction
+from itertools import count
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import urdfkin
+from tests.counted import Counted, Matrix, all_conspiring, deviation, eq
 from tests.export.writing import ALL, code
+from tests.kinematics.test_roundings import PARTS, most, of_sines, theirs, turn
 from tests.laws.subjects import robot_of
-from urdfkin.export import write
+from urdfkin.export import recursion, write
+from urdfkin.export.c import framed
 from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, balls, literal
+from urdfkin.export.expression import Graph, Node, needed
 from urdfkin.export.proof import decimal
+from urdfkin.kinematics import roundings
+from urdfkin.kinematics.rotation import rotation_from_rpy
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.exact.numbers import precision
 
@@ -124,3 +142,129 @@ def test_sines_and_roots_that_are_fractions_are_constants() -> None:
     assert graph.sine_cosine(Fraction(0)) == (0, 1)
     assert graph.root(Fraction(9, 4)) == Fraction(3, 2)
     assert graph.root(Fraction(2)).op == "sqrt"
+
+
+# What an export rounds, and leaves out, by its own expressions on numbers that remember their roundings.
+
+
+#: Roundings of their own for what is left out, apart from those that numbers count.
+_LEFT_OUT = count(-1, -1)
+#: What sine and cosine may be off by, in halves of an eps.
+SINE = 2.0
+_OPERATIONS: dict[str, Callable[..., Counted]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "neg": operator.neg,
+}
+
+
+def of_constant(R: Matrix, S: FloatArray) -> Matrix:
+    """R S by the expressions that are written; what is left out of S is as large as it may be."""
+    graph, kept = Graph(), [recursion._without_rounding(row) for row in S.tolist()]
+    letters = [[graph.input("q", 3 * r + c) for c in range(3)] for r in range(3)]
+    results = graph.chapter.product(letters, kept)
+    value: dict[Node, Counted] = {}
+    for node in needed([x for row in results for x in row]):
+        of = [value[x] if isinstance(x, Node) else Counted(float(x)) for x in node.of if node.op != "q"]
+        value[node] = _OPERATIONS[node.op](*of) if of else R[node.of[0] // 3][node.of[0] % 3]
+    names = [[next(_LEFT_OUT) for _ in row] for row in S]
+
+    def number(r: int, c: int) -> Counted:
+        x = results[r][c]
+        found = value[x] if isinstance(x, Node) else Counted(float(x))
+        left = {names[k][c]: R[r][k].value * float(np.abs(S[k]).max()) for k in range(3) if kept[k][c] == 0.0}
+        return Counted(found.value, found.errors | left)
+
+    return tuple((number(r, 0), number(r, 1), number(r, 2)) for r in range(3))  # type: ignore[return-value]
+
+
+def partly_zero(x: FloatArray) -> FloatArray:
+    """A turn about a coordinate axis, or one that exchanges axes, with numbers to be left out."""
+    exchange = rotation_from_rpy(np.round(x[4:7]) * math.pi / 2.0)
+    about_z = rotation_from_rpy(np.array([0.0, 0.0, x[3] if x[6] > 0.0 else 0.0]))
+    S = about_z @ exchange if x[5] > 0.0 else exchange @ about_z
+    return np.where(np.abs(S) < 1e-9, 0.4 * EPS, S)
+
+
+def turned(R: Matrix, angle: float, *, fused: bool) -> Matrix:
+    """R and a joint's turn, sine and cosine as C's batches have them."""
+    numbers = (Counted(f(angle), {next(_LEFT_OUT): SINE}, fused) for f in (math.sin, math.cos))
+    return eq.product(R, eq.about_z(*numbers, 0, 1))  # type: ignore[no-any-return]
+
+
+def joint(x: FloatArray, *, fused: bool) -> Matrix:
+    """The rotation so far, the constant, the turn."""
+    rows = of_sines(x)
+    constant = tuple(tuple(Counted(c.value, c.errors, fused) for c in row) for row in rows)
+    return turned(eq.product(turn(x[4:], fused=fused), constant), float(x[3]), fused=fused)
+
+
+COUNTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
+    "a constant of which something is left out": (
+        lambda x: of_constant(turn(x, fused=False), partly_zero(x)),
+        1.5,
+    ),
+    "a turn, fused": (lambda x: turned(turn(x, fused=True), float(x[3]), fused=True), 2.5),
+    "a turn": (lambda x: turned(turn(x, fused=False), float(x[3]), fused=False), 2.6),
+    "a joint, fused": (lambda x: joint(x, fused=True), 6.5),
+    "a joint": (lambda x: joint(x, fused=False), 7.2),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", COUNTS)
+def test_no_part_of_an_exports_joint_rounds_more_than_the_table_says_nor_much_less(name: str) -> None:
+    part, counted = COUNTS[name]
+    assert 0.8 * counted < most(all_conspiring, part) <= counted
+    table = (roundings.__doc__ or "").partition("**An export**")[2].partition("**MuJoCo**")[0]
+    assert f" {counted} |" in table
+
+
+@pytest.mark.long
+def test_an_exports_roundings_are_within_the_count_as_urdfkins_own_are() -> None:
+    assert COUNTS["a constant of which something is left out"][1] < PARTS["Pinocchio's"][1]
+    assert COUNTS["a joint"][1] + PARTS["a joint of Pinocchio's"][1] <= roundings.ROUNDINGS
+    own = most(deviation, lambda x: joint(x, fused=False))
+    assert math.hypot(own, most(deviation, theirs)) < roundings.ROUNDINGS / 9.0
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize("real", ["double", "float"])
+@pytest.mark.parametrize("fusing", ["off", "fast"])
+def test_the_sines_of_c_are_right_to_one_eps(real: str, fusing: str, tmp_path: Path) -> None:
+    source, library = tmp_path / "sines.c", tmp_path / "sines.so"
+    head = f"#include <tgmath.h>\ntypedef {real} real;\n#define INLINE static\n"
+    head += "#define SELDOM static\n#define R(x) ((real)(x))\n#define LANES 8\n"
+    entrance = "void of(long n, const real *x, real *s, real *c) {\n"
+    entrance += "    for (; n > 0; n -= 16, x += 16, s += 16, c += 16) sines_cosines(x, s, c, 2);\n}\n"
+    source.write_text(head + framed("sines.c") + entrance, encoding="utf-8")
+    flags = ["-std=c99", "-O2", "-march=native", f"-ffp-contract={fusing}", "-fPIC", "-shared"]
+    subprocess.run(["cc", *flags, str(source), "-o", str(library), "-lm"], check=True)
+    kind, far = (np.float64, 823_549.0) if real == "double" else (np.float32, 8192.0)
+    rng = np.random.default_rng(0)
+    ranges = [rng.uniform(-size, size, 40_000) for size in (1.0, 7.0, far, 2.0 * far)]
+    zeros = np.arange(1, 4993) * (0.5 * np.pi)  # a sine or a cosine is nearly 0
+    x = np.concatenate([*ranges, zeros]).astype(kind)
+    found = np.empty((2, len(x)), kind)
+    arrays = (ctypes.c_void_p(a.ctypes.data) for a in (x, *found))
+    ctypes.CDLL(str(library)).of(ctypes.c_long(len(x)), *arrays)
+    wide = x.astype(np.longdouble)
+    error = np.abs(found - np.array([np.sin(wide), np.cos(wide)]))
+    assert 0.3 < float(error.max()) / np.finfo(kind).eps < 0.5 * SINE
+    # A small sine of a large angle has an error of eps, not of eps of itself. The bound in single precision
+    # needs both terms.
+    within = roundings.SINGLE_OPERATION["sin"] * np.finfo(kind).eps * np.abs([np.sin(wide), np.cos(wide)])
+    assert np.any(error > within) == (kind is np.float32)
+    assert SINE == 2.0 * roundings.SINGLE_POLYNOMIAL
+
+
+def test_no_more_is_left_out_of_a_constant_than_half_an_eps_of_its_largest_number() -> None:
+    for largest in (1.0, 0.3, 7e5, 5e-324):
+        for share in (0.0, 0.49, 0.51, 1e3):
+            row = largest, -share * EPS * largest, 0.0
+            kept = recursion._without_rounding(row)
+            assert kept[0] == largest
+            assert abs(kept[1] - row[1]) <= 0.5 * EPS * largest
+            assert kept[1] == row[1] or share < 0.5
+    assert re.search(r"less than half an eps", roundings.__doc__ or "")

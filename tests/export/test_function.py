@@ -1,25 +1,119 @@
-"""The printed expressions compute what Pinocchio computes, for every joint kind, quantity and reference."""
+"""Printed expressions and formulas compute what Pinocchio computes, and write nothing twice."""
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Callable
 from copy import copy
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import urdfkin
 from scripts.benchmarking.operations import operations
-from tests.export.writing import code
-from tests.laws.subjects import robot_of
+from tests.export.writing import ALL, code
+from tests.laws.subjects import robot_of, state
+from urdfkin.export import write
 from urdfkin.export.code import exported
-from urdfkin.export.expression import Node
+from urdfkin.export.expression import Graph, Node, needed
 from urdfkin.export.function import Function, function_of
 from urdfkin.export.proof import CHECKED
+from urdfkin.kinematics import equations
 from urdfkin.model.configuration import draw
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import ACCELERATION, JACOBIAN
+
+INPUTS = (0.7, -1.3, 2.9)
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "+": lambda x, y: x + y,
+    "-": lambda x, y: x - y,
+    "*": lambda x, y: x * y,
+    "neg": lambda x: -x,
+    "sin": math.sin,
+    "cos": math.cos,
+}
+
+
+def value(x: Any) -> float:
+    """What an expression comes to for `INPUTS`."""
+    if not isinstance(x, Node):
+        return float(x)
+    if x.op == "q":
+        return INPUTS[x.of[0]]
+    return float(_OPERATIONS[x.op](*map(value, x.of)))
+
+
+@st.composite
+def written(draw: st.DrawFn) -> list[tuple[str, int, int]]:
+    """Operations, each on two of the numbers so far."""
+    letters = st.sampled_from("+-*n")
+    return [(draw(letters), draw(st.integers(0, 30)), draw(st.integers(0, 30))) for _ in range(12)]
+
+
+@pytest.mark.slow
+@given(written())
+def test_an_expression_has_the_value_of_its_arithmetic(steps: list[tuple[str, int, int]]) -> None:
+    graph = Graph()
+    numbers: list[Any] = [0.0, 1.0, -1.0, 0.5, *(graph.input("q", i) for i in range(3))]
+    plain = [0.0, 1.0, -1.0, 0.5, *INPUTS]
+    for op, i, k in steps:
+        for row in (numbers, plain):
+            x, y = row[i % len(row)], row[k % len(row)]
+            row.append(-x if op == "n" else _OPERATIONS[op](x, y))
+    for found, expected in zip(numbers, plain, strict=True):
+        size = max(map(abs, plain))
+        assert abs(value(found) - expected) <= 1e-13 * size
+
+
+@pytest.mark.slow
+@given(written())
+def test_no_operation_is_made_for_nothing(steps: list[tuple[str, int, int]]) -> None:
+    graph = Graph()
+    numbers: list[Any] = [0.0, 1.0, -1.0, 0.5, *(graph.input("q", i) for i in range(3))]
+    for op, i, k in steps:
+        x, y = numbers[i % len(numbers)], numbers[k % len(numbers)]
+        numbers.append(-x if op == "n" else _OPERATIONS[op](x, y))
+    for node in needed(numbers):
+        constants = [x for x in node.of if not isinstance(x, Node)]
+        if node.op in "+-*":
+            assert len(constants) < 2
+            assert 0.0 not in constants
+            assert all(x > 0.0 for x in constants)
+            assert not any(x.op == "neg" for x in node.operands)
+        if node.op == "*":
+            assert 1.0 not in constants
+        if node.op == "neg":
+            assert node.operands[0].op != "neg"
+
+
+def test_what_was_written_before_is_the_same_again() -> None:
+    graph = Graph()
+    x, y, z = (graph.input("q", i) for i in range(3))
+    assert x * y + z is z + y * x
+    difference = y - x
+    assert (x - y).of == (difference,), "turned round it is the same with a minus"
+    assert (-x) * y is -(x * y)
+    assert graph.sine_cosine(x)[0] is graph.sine_cosine(x)[0]
+
+
+def test_an_equation_notes_its_numbers_on_what_it_makes_itself_or_through_another() -> None:
+    graph = Graph()
+    x = tuple(graph.input("q", i) for i in range(3))
+    y = tuple(graph.input("v", i) for i in range(3))
+    turned = graph.chapter.point_acceleration(x, x, y, x)
+    assert {node.equation for node in needed(turned) if node.op in "+-*"} == {"7.123, 7.130"}
+    assert graph.chapter.plus(x, y)[0].equation == ""
+    assert "7.123, 7.130" in str(equations.point_acceleration.__doc__)
+
+
+# The printed expressions compute what Pinocchio computes, for every joint kind, quantity and reference.
+
 
 ODD = (
     "floating_root",
@@ -107,3 +201,52 @@ def test_a_robot_with_huge_and_tiny_links_keeps_its_tiny_ones() -> None:
     lengths = {x for node in function.nodes for x in node.of if isinstance(x, float)}
     assert any(0.0 < x < 1e-5 for x in lengths)
     assert any(x > 100.0 for x in lengths)
+
+
+# The formulas of a document are those of the code: read back as text, they compute what Pinocchio does.
+
+
+_LINE = re.compile(r"^(\S+) &= (.*?)(?: \\\\)?$", re.MULTILINE)
+_SYMBOL = re.compile(r"(?:\\(?:d?dot|omega)(?:\{\\?[A-Za-z]+\})?|[A-Za-z])(?:\^\{\(\d+\)\})?_\{[\w,]+\}")
+
+
+def evaluated(text: str, values: dict[str, float]) -> dict[str, float]:
+    """What each formula comes to; nothing is used before it is defined."""
+    for name, formula in _LINE.findall(text):
+        plain = re.sub(r" \\cdot 10\^\{(-?\d+)\}", r"e\1", formula)
+        plain = re.sub(r"\\operatorname\{(\w+)\}", r"\1", plain).replace(r" \, ", " * ")
+        plain = _SYMBOL.sub(lambda found: f"x[{found[0]!r}]", plain)
+        scope = {"x": values, "sin": math.sin, "cos": math.cos, "sqrt": math.sqrt}
+        values[name] = float(eval(plain, {"__builtins__": {}}, scope))
+    return values
+
+
+def test_a_documents_formulas_compute_what_the_robot_does() -> None:
+    robot = urdfkin.load("ur5")
+    document = write(code(robot, "tool0", ALL), "latex")
+    q, v, a = (x[0] for x in state(robot, 1, 4))
+    given = {
+        f"{letter}_{{{k + 1}}}": float(number)
+        for letter, numbers in (("q", q), ("v", v), ("a", a))
+        for k, number in enumerate(numbers)
+    }
+    sections = document.split(r"\subsection*")[1:]
+    assert len(sections) == len(ALL)
+    expected = {
+        "T": robot.placement(q, "tool0"),
+        "J": robot.jacobian(q, "tool0"),
+        r"\dot{J}": robot.jacobian_rate(q, v, "tool0"),
+    }
+    found = [evaluated(section, dict(given)) for section in sections]
+    for letter, matrix in expected.items():
+        (own,) = (x for x in found if f"{letter}_{{1,1}}" in x)
+        numbers = [
+            [own[f"{letter}_{{{i + 1},{k + 1}}}"] for k in range(matrix.shape[1])] for i in range(len(matrix))
+        ]
+        assert np.abs(np.array(numbers) - matrix).max() < 1e-12
+
+
+def test_braces_and_environments_of_a_document_are_closed() -> None:
+    document = write(code(urdfkin.load("planar_two_link")), "latex")
+    assert document.count(r"\begin{") == document.count(r"\end{")
+    assert document.replace(r"\{", "").count("{") == document.replace(r"\}", "").count("}")

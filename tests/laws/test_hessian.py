@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 import urdfkin
-from tests.laws.subjects import EPS, NAMES, robot_of, state
+from tests.laws.subjects import NAMES, robot_of, state
 from urdfkin.compiled import evaluate
 from urdfkin.kinematics import equations as eq
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind

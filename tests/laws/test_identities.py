@@ -1,17 +1,28 @@
 """Identities that hold for any robot, whatever Pinocchio says."""
 
+from __future__ import annotations
+
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.laws.subjects import EPS, NAMES, robot_of, state
+import urdfkin
+from tests.laws.subjects import NAMES, moved, robot_of, rotation_vector, state
 from tests.robots.odd_urdfs import Urdf
-from urdfkin import load
+from urdfkin import VerificationError, load
+from urdfkin.compiled import evaluate
+from urdfkin.kinematics import bodies
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.model.base_motion import BaseMotion
+from urdfkin.kinematics.roundings import EPS
+from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE
 
 LOCAL, WORLD, ALIGNED = Reference
 #: Room for the rounding of a law's own arithmetic, in eps of the largest number that enters it.
@@ -210,3 +221,186 @@ def test_an_elbow_of_three_and_four_metres_is_where_pythagoras_puts_it() -> None
     # Both joints at 1 rad/s: by 7.130 -w1^2 d1 - w2^2 d2 = -1 (3, 0) - 4 (0, 4).
     acceleration = robot.acceleration(q, [1.0, 1.0], [0.0, 0.0], "tip")
     assert acceleration[:2] == pytest.approx([-3.0, -16.0], abs=1e-14)
+
+
+# J a + J-dot v is the recursion's acceleration, on every robot of the catalogue and in every reference.
+
+
+def room(bound: Bound) -> FloatArray:
+    """What a quantity may be off by, number for number."""
+    allowed: FloatArray = EPS * bound.k * bound.scale
+    return allowed
+
+
+@pytest.mark.parametrize("name", [*catalogue(), *sorted(set(NAMES) - set(catalogue()))])
+def test_the_jacobian_and_its_rate_make_the_acceleration(name: str) -> None:
+    robot = urdfkin.load(name, verify=False) if name in catalogue() else robot_of(name)
+    tree = robot.tree
+    generator = np.random.default_rng(5)
+    q, (v, a) = robot.sample(4, 5), generator.normal(size=(2, 4, tree.nv))
+    plan = robot.plan(range(len(tree.links)))
+    size = magnitudes(plan, q, v, a, STILL_STATE)
+    for reference in Reference:
+        J, J_rate = evaluate.jacobians(plan, q, reference), evaluate.jacobian_rates(plan, q, v, reference)
+        total = np.einsum("nfij,nj->nfi", J, a) + np.einsum("nfij,nj->nfi", J_rate, v)
+        expected = evaluate.accelerations(plan, q, v, a, reference)
+        if reference is not Reference.LOCAL_WORLD_ALIGNED:
+            # There it is the spatial acceleration that they make.
+            velocity = evaluate.velocities(plan, q, v, reference)
+            expected[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
+        allowed = (
+            np.einsum("nfij,nj->nfi", room(JACOBIAN.bound(plan, size, reference)), np.abs(a))
+            + np.einsum("nfij,nj->nfi", room(JACOBIAN_RATE.bound(plan, size, reference)), np.abs(v))
+            + room(ACCELERATION.bound(plan, size, reference))
+        )
+        assert (np.abs(total - expected) <= allowed).all(), reference
+
+
+# -- the Jacobian and the acceleration are derivatives of the placement: a study of the step size ------------
+
+
+STEPS = 2.0 ** -np.arange(3.0, 26.0)
+
+
+def errors(name: str, seed: int, order: int) -> tuple[FloatArray, FloatArray, float]:
+    """Errors of the quotients of position and orientation at each step, and the size of what is divided."""
+    robot = robot_of(name)
+    q, v, a = (x[0] for x in state(robot, 1, seed))
+    frame = robot.tip_frame
+    after = robot.placement(moved(robot, q, v, STEPS), frame)
+    before = robot.placement(moved(robot, q, v, -STEPS), frame)
+    now = robot.placement(q, frame)
+    reach = 1.0 + float(np.abs(after[:, :3, 3]).max())
+    h = STEPS[:, np.newaxis]
+    if order == 1:
+        velocity = robot.jacobian(q, frame) @ v
+        linear = (after[:, :3, 3] - before[:, :3, 3]) / (2.0 * h) - velocity[:3]
+        turn = rotation_vector(after[:, :3, :3] @ before[:, :3, :3].swapaxes(-1, -2)) / (2.0 * h)
+        return np.abs(linear).max(axis=1), np.abs(turn - velocity[3:]).max(axis=1), reach
+    acceleration = robot.acceleration(q, v, np.zeros_like(a), frame)
+    linear = (after[:, :3, 3] - 2.0 * now[:3, 3] + before[:, :3, 3]) / h**2 - acceleration[:3]
+    forth = rotation_vector(after[:, :3, :3] @ now[:3, :3].T)
+    back = rotation_vector(before[:, :3, :3] @ now[:3, :3].T)
+    turn = (forth + back) / h**2 - acceleration[3:]
+    return np.abs(linear).max(axis=1), np.abs(turn).max(axis=1), reach
+
+
+def assert_converges(error: FloatArray, reach: float, order: int) -> None:
+    """Falls with h^2 as long as truncation rules, and ends at the rounding floor."""
+    floor = 200.0 * EPS * reach / STEPS**order
+    falling = np.flatnonzero((error[:-1] > 30.0 * floor[:-1]) & (error[1:] > 30.0 * floor[1:]))
+    if len(falling) > 2:
+        rates = np.log2(error[falling] / error[falling + 1])
+        assert abs(rates[-1] - 2.0) < 0.1, rates
+        assert abs(rates[len(rates) // 2 :] - 2.0).max() < 0.3, rates
+    constant = max(float(error[0]), reach) / STEPS[0] ** 2
+    assert (error <= 4.0 * constant * STEPS**2 + floor).all()
+    # The best step leaves an error of about eps^(2/3) for slopes and eps^(1/2) for curvatures.
+    assert error.min() < 300.0 * reach * EPS ** (2.0 / (2.0 + order))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("name", NAMES)
+def test_the_jacobian_is_the_limit_of_difference_quotients_of_second_order(name: str, seed: int) -> None:
+    linear, angular, reach = errors(name, seed, order=1)
+    assert_converges(linear, reach, 1)
+    assert_converges(angular, 1.0, 1)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("name", NAMES)
+def test_the_acceleration_is_the_limit_of_second_differences_along_constant_rates(
+    name: str, seed: int
+) -> None:
+    linear, angular, reach = errors(name, seed, order=2)
+    assert_converges(linear, reach, 2)
+    assert_converges(angular, 1.0, 2)
+
+
+def test_a_jacobian_that_is_slightly_wrong_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    linear, _, reach = errors("panda", 0, order=1)
+    with pytest.raises(AssertionError):
+        assert_converges(linear + 1e-7, reach, 1)
+
+
+# -- a placement in another frame: how such placements compose, and how they are held ------------------------
+
+
+#: Frames of one branch and of two, up the tree, down and across; a base that moves by itself, a follower.
+TRIPLES = {
+    "panda": (
+        ("panda_link4", "panda_hand", "panda_leftfinger"),
+        ("panda_rightfinger", "panda_link2", "panda_link0"),
+    ),
+    "talos": (("left_sole_link", "gripper_right_base_link", "torso_1_link"),),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "frames", "root_joint"),
+    [(name, frames, joint) for name in TRIPLES for frames in TRIPLES[name] for joint in (None, "floating")],
+)
+def test_neighbours_cancel_and_the_way_back_is_the_inverse(
+    name: str, frames: tuple[str, str, str], root_joint: str | None
+) -> None:
+    robot = urdfkin.load(name, root_joint=root_joint)
+    q = robot.sample(5, seed=1)
+    a, b, c = frames
+    T_a_b, T_b_c, T_a_c, T_b_a = (
+        robot.relative_placement(q, frame, relative_to=other)
+        for other, frame in ((a, b), (b, c), (a, c), (b, a))
+    )
+    np.testing.assert_allclose(T_a_b @ T_b_c, T_a_c, atol=1e-14)
+    np.testing.assert_allclose(T_a_b @ T_b_a, np.broadcast_to(np.eye(4), T_a_b.shape), atol=1e-14)
+    T_world = robot.placement(q, a)
+    np.testing.assert_allclose(T_world @ T_a_b, robot.placement(q, b), atol=1e-14)
+    assert robot.certificate().verified
+
+
+def test_it_is_the_chains_placement() -> None:
+    robot = urdfkin.load("panda")
+    q = robot.sample(6, seed=2)
+    path = robot.chain("panda_leftfinger", "panda_link3")
+    T = robot.relative_placement(q, "panda_leftfinger", "panda_link3")
+    np.testing.assert_allclose(T, path.placement(robot.select(path, q)), atol=1e-14)
+
+
+def test_several_frames_batches_and_a_given_array_are_as_in_placement() -> None:
+    robot = urdfkin.load("ur5")
+    q = robot.sample(6, seed=3).reshape(2, 3, 6)
+    out = np.empty((2, 3, 2, 4, 4))
+    both = robot.relative_placement(q, ["tool0", "base_link"], "wrist_1_link", out=out)
+    assert both is out
+    for f, frame in enumerate(("tool0", "base_link")):
+        np.testing.assert_array_equal(both[:, :, f], robot.relative_placement(q, frame, "wrist_1_link"))
+    line = robot.certificate().lines[0]
+    assert (line.quantity, line.checked) == ("relative placement", 24)  # no result for the frame looked from
+
+
+@pytest.mark.parametrize("slip", [1e-12, "transposed", "in the world's axes"])
+def test_a_slip_in_it_is_a_disagreement_with_a_line_that_shows_it(
+    slip: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    face: Any = bodies
+    right = face.seen_from
+
+    def wrong(T_a: FloatArray, T_b: FloatArray, out: FloatArray | None) -> FloatArray:
+        T: FloatArray = right(T_a, T_b, out)
+        if slip == "transposed":
+            T[..., :3, :3] = T[..., :3, :3].swapaxes(-1, -2).copy()
+        elif isinstance(slip, float):
+            T[..., 0, 3] += slip
+        else:
+            T[..., :3, 3] = T_b[..., :3, 3] - T_a[..., :3, 3]
+        return T
+
+    robot = urdfkin.load("ur5")
+    q = robot.sample(1, seed=4)[0]
+    monkeypatch.setattr(face, "seen_from", wrong)
+    with pytest.raises(VerificationError, match="relative placement of tool0") as caught:
+        robot.relative_placement(q, "tool0", "forearm_link")
+    monkeypatch.undo()
+    again = caught.value.reproduce
+    assert again.startswith("urdfkin.load('ur5').relative_placement(")
+    np.testing.assert_array_equal(eval(again), robot.relative_placement(q, "tool0", "forearm_link"))

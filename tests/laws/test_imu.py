@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.laws.subjects import EPS, NAMES, moved, robot_of, rotation_vector, state
+from tests.laws.subjects import NAMES, moved, robot_of, rotation_vector, state
 from urdfkin.compiled import evaluate
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rotation_of
+from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.oracle import free_flyer, free_flyer_rates, free_flyer_second_rates

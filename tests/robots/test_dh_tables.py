@@ -1,11 +1,19 @@
-"""Every base-to-leaf path of every catalogue robot, both conventions: the table is Pinocchio's robot."""
+"""The tables of the catalogue's robots: Pinocchio's motion, and the vendors' cells."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from urdfkin.dh import read_table
 from urdfkin.dh.common_normals import left_out
+from urdfkin.dh.compare import compare
 from urdfkin.dh.make import dh_table
+from urdfkin.dh.parse_table import reference_path, references
+from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.robot.loading import load
 from urdfkin.urdf.catalogue import examples
@@ -51,3 +59,80 @@ def test_a_path_through_the_common_ancestor_agrees_with_pinocchio(
 ) -> None:
     table = load(name).dh(tip, base, convention, snap=snap)
     assert table.rows
+
+
+# -- the vendors' tables come out of the shipped URDFs, cell by cell, and the shipped references agree -------
+
+
+#: Reference -> (snap, last) with which the table is the vendor's, and metres that the tip may then move.
+EXACT = {
+    "ur3": (1e-6, "tip", 1e-11),
+    "ur5": (1e-6, "tip", 1e-11),
+    "ur10": (1e-6, "tip", 1e-11),
+    "panda": (0.0, "flange", 0.0),
+    "xarm7_standard": (1e-4, "tip", 1e-5),
+    "xarm7_modified": (1e-4, "tip", 1e-5),
+}
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_every_cell_of_the_vendors_table_comes_out_of_the_urdf(name: str) -> None:
+    reference = read_table(reference_path(name))
+    snap, last, metres = EXACT[name]
+    table = load(reference.robot).dh(
+        reference.tip_frame, reference.base_frame, str(reference.convention), snap=snap, last=last
+    )
+    for row, other in zip(table.rows, reference.rows, strict=True):
+        assert row.joint == other.joint
+        np.testing.assert_allclose(row.cells, other.cells, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(table.base, np.eye(4), atol=1e-15)
+    np.testing.assert_allclose(table.tool, reference.tool, atol=1e-15)
+    if snap:
+        assert table.snap is not None
+        assert table.snap.metres <= metres
+
+
+@pytest.mark.slow
+def test_the_kinova_sheet_differs_by_its_rounding_and_the_way_its_joints_count() -> None:
+    reference = read_table(reference_path("kinova"))
+    robot = load("kinova")
+    found = compare(robot.chain(reference.tip_frame, reference.base_frame), reference)
+    assert found.agrees
+    assert [(one.row, one.cell) for one in found.differences] == [(3, "d")]
+    assert found.differences[0].urdf == pytest.approx(-0.31105, abs=1e-9)
+    assert found.metres < 5.01e-5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", references())
+def test_a_shipped_reference_agrees_with_its_urdf_as_it_says(name: str) -> None:
+    reference = read_table(reference_path(name))
+    found = compare(load(reference.robot).chain(reference.tip_frame, reference.base_frame), reference)
+    text = reference_path(name).read_text()
+    assert found.agrees
+    assert found.residual <= 1e-12
+    assert ('checked = "exact' in text) == found.exact
+    assert f"{found.metres:.1e} m" in text or found.exact
+    assert 'source = "' in text
+
+
+@pytest.mark.slow
+def test_a_catalogue_that_is_wrong_by_03_mm_is_found_out() -> None:
+    """A published xArm7 table (robotkinematicscatalogue 1.1.2) has a3 = 52.2 instead of 52.5 mm."""
+    reference = read_table(reference_path("xarm7_modified"))
+    rows = list(reference.rows)
+    rows[3] = replace(rows[3], a=0.0522, alpha=-math.pi / 2, theta=math.pi)
+    rows[4] = replace(rows[4], a=-0.0775)
+    rows[5] = replace(rows[5], alpha=-math.pi / 2)
+    rows[6] = replace(rows[6], a=-0.076, alpha=math.pi / 2, theta=math.pi)
+    found = compare(load("xarm7").chain("link_eef", "link_base"), replace(reference, rows=tuple(rows)))
+    assert not found.agrees
+    assert found.senses == (1, 1, 1, -1, 1, 1, 1)
+    wrong = [one for one in found.differences if one.tip > 1e-4]
+    assert [(one.row, one.cell) for one in wrong] == [(3, "a")]
+    assert wrong[0].difference == pytest.approx(3e-4, abs=1e-9)
+
+
+def test_an_unknown_reference_offers_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="did you mean"):
+        reference_path("xarm7_standrad")

@@ -103,17 +103,9 @@ def test_every_call_is_checked_and_the_certificate_counts_it(name: str) -> None:
     }
 
 
-@settings(max_examples=15)
-@given(st.integers(1000, 10**6))
-def test_any_tree_agrees(seed: int) -> None:
-    text = random_tree(seed)
-    assert_verified(urdfkin.validate(text, samples=3, seed=seed).robots[0], load(text), samples=6)
-
-
-@pytest.mark.slow
 @settings(max_examples=50)
 @given(st.integers(1000, 10**9))
-def test_any_of_many_trees_agrees(seed: int) -> None:
+def test_any_tree_agrees(seed: int) -> None:
     text = random_tree(seed)
     assert_verified(urdfkin.validate(text, samples=10, seed=seed).robots[0], load(text), samples=13)
 

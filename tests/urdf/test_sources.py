@@ -1,4 +1,4 @@
-"""Whatever a robot is read from, no more of it is read than was allowed."""
+"""Whatever a robot is read from, no more of it is read than was allowed, and it is read once."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import os
 import sys
 from pathlib import Path
 from typing import Any
+from xml.parsers import expat
 
 import pytest
 
+import urdfkin
+from tests.urdf.lint.cases.arm import arm, axis
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST, read_standard_input
 from urdfkin.urdf.catalogue import catalogue
@@ -72,3 +75,38 @@ def test_a_package_that_is_nowhere_is_called_as_it_was_written() -> None:
 
 def test_no_name_of_the_catalogue_has_a_point_or_a_separator() -> None:
     assert not [name for name in catalogue() if set(name) & {".", "/", os.sep}]
+
+
+# -- a text is read once to be checked and computed; Pinocchio's side reads it again when it is asked --------
+
+
+FOLLOWS = arm(follow='<mimic joint="j1" multiplier="-0.5"/>')
+
+
+@pytest.fixture
+def parsers(monkeypatch: pytest.MonkeyPatch) -> list[expat.XMLParserType]:
+    """Every parser that is made."""
+    made: list[expat.XMLParserType] = []
+    create = expat.ParserCreate
+
+    def noted(encoding: str) -> expat.XMLParserType:
+        made.append(create(encoding))
+        return made[-1]
+
+    monkeypatch.setattr(expat, "ParserCreate", noted)
+    return made
+
+
+@pytest.mark.parametrize("text", [arm(), FOLLOWS, axis("1e-13 0 1")], ids=["plain", "follows", "tilted"])
+def test_load_reads_the_text_once(text: str, parsers: list[expat.XMLParserType]) -> None:
+    urdfkin.load(text)
+    assert len(parsers) == 1
+
+
+def test_the_rules_of_followers_are_read_again_when_a_result_is_checked(
+    parsers: list[expat.XMLParserType],
+) -> None:
+    robot = urdfkin.load(FOLLOWS)
+    robot.placement([0.3], "tool")
+    assert robot.certificate().verified
+    assert len(parsers) == 2

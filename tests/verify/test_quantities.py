@@ -10,13 +10,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import urdfkin
+from scripts.check_bits import WAYS
 from tests.cli.running import urdfkin as command
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import CompiledTree
+from urdfkin.compiled.preload import only
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.registry import equations
+from urdfkin.model.configuration import draw, draw_base, special
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.html import as_html
@@ -25,7 +30,7 @@ from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Magnitudes
-from urdfkin.verify.oracle import Oracle, QueryBatch
+from urdfkin.verify.oracle import Oracle, QueryBatch, coupled
 from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, recursive_quantities
 
 # -- a made-up row: the angular velocity alone ---------------------------------------------------------
@@ -187,3 +192,88 @@ def test_what_is_no_row_or_takes_other_inputs_is_refused() -> None:
         robot.compute("velocity", ([0.0, 0.0],), "slider")
     with pytest.raises(InputError, match="has a method of its own; call analytical_jacobian"):
         robot.compute("analytical jacobian", ([0.0, 0.0],), "slider")
+
+
+# -- followers' columns are added to their leaders' as J_full G says, whatever the numbers are ---------------
+
+
+@given(st.data())
+def test_it_is_the_product_with_g_to_the_last_bit(data: st.DataObject) -> None:
+    nv, full = data.draw(st.integers(1, 5)), data.draw(st.integers(1, 8))
+    index = np.array(
+        data.draw(st.lists(st.integers(0, nv - 1), min_size=full, max_size=full)), dtype=np.int64
+    )
+    factor = np.array(data.draw(st.lists(st.floats(-2.0, 2.0), min_size=full, max_size=full)))
+    columns = np.array(data.draw(st.permutations(range(full)))[: data.draw(st.integers(0, full))], np.int64)
+    shape = data.draw(st.sampled_from([(), (1,), (3, 6), (2, 0, 6), (2, 3, 6)]))
+    numbers = st.floats() | st.just(np.inf) | st.just(np.nan)
+    pool = data.draw(st.lists(numbers, min_size=1, max_size=30))
+    J = np.resize(np.array(pool), (*shape, full))
+    expected = np.zeros((*shape, nv))
+    with np.errstate(all="ignore"):
+        for column in columns:
+            expected[..., index[column]] += J[..., column] * factor[column]
+    for way in WAYS:
+        with only(way):
+            np.testing.assert_array_equal(coupled(J, columns, index, factor, nv), expected)
+
+
+def test_it_takes_views_and_leaves_them_as_they_are() -> None:
+    J = np.arange(24.0).reshape(2, 3, 4).swapaxes(0, 1)
+    J.setflags(write=False)
+    places = np.array([0, 2], dtype=np.int64)
+    found = coupled(J, places, np.array([0, 0, 1, 1]), np.array([1.0, 1.0, -2.0, 1.0]), 2)
+    np.testing.assert_array_equal(found, J[..., [0, 2]] * [1.0, -2.0])
+
+
+@pytest.mark.parametrize("rows", [0, 1])
+def test_a_robot_without_rates_has_no_columns(rows: int) -> None:
+    nothing = np.zeros(0, dtype=np.int64)
+    assert coupled(np.zeros((rows, 6, 0)), nothing, nothing, np.zeros(0), 0).shape == (rows, 6, 0)
+
+
+# -- what a validation draws: as many as asked for, special configurations first, some rates large -----------
+
+
+@pytest.mark.parametrize("with_special", [True, False])
+def test_special_configurations_come_first_where_they_are_asked_for_and_nowhere_else(
+    with_special: bool,
+) -> None:
+    robot = urdfkin.load("panda")
+    drawn = draw(robot.tree, 40, np.random.default_rng(0), with_special=with_special)
+    extra = 3 if with_special else 0
+    assert drawn.q.shape[0] == drawn.v.shape[0] == drawn.a.shape[0] == 40 + extra
+    assert (drawn.q[:3] == special(robot.tree)).all() == with_special
+    limits = [joint.limit for joint in robot.tree.joints if joint.nq == 1]
+    assert special(robot.tree)[1].tolist() == [limit.lower for limit in limits if limit]
+    assert special(robot.tree)[2].tolist() == [limit.upper for limit in limits if limit]
+
+
+def test_every_eighth_sample_has_rates_a_hundred_times_as_large() -> None:
+    drawn = draw(urdfkin.load("panda").tree, 400, np.random.default_rng(0), with_special=False)
+    for rates in (drawn.v, drawn.a):
+        sizes = np.sqrt((rates**2).mean(axis=-1))
+        assert 80.0 < sizes[::8].mean() < 120.0
+        assert 0.8 < np.delete(sizes, np.s_[::8]).mean() < 1.2
+
+
+def test_a_base_is_placed_and_moves_otherwise_in_every_sample() -> None:
+    base = draw_base(400, np.random.default_rng(0))
+    assert base.batch_shape == (400,)
+    assert np.abs(base.placement[:, :3, 3]).max() <= 2.0
+    assert np.unique(base.placement[:, :3, :3].round(6), axis=0).shape[0] == 400
+    for rates in (base.velocity, base.acceleration):
+        sizes = np.sqrt((rates**2).mean(axis=-1))
+        assert 80.0 < sizes[::8].mean() < 120.0
+        assert 0.8 < np.delete(sizes, np.s_[::8]).mean() < 1.2
+
+
+def test_more_configurations_than_memory_holds_are_refused_in_one_line() -> None:
+    robot = urdfkin.load("ur5", verify=False)
+    with pytest.raises(InputError) as caught:
+        robot.sample(10**15)
+    assert str(caught.value) == (
+        "ur5: this number of configurations does not fit into memory: found n = 1000000000000000, which are "
+        "48000000 GB; draw them in parts, each with a seed of its own"
+    )
+    assert caught.value.__cause__ is None

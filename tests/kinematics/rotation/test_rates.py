@@ -1,23 +1,39 @@
-"""Rates of a rotation and angular velocity are each other's, against derivatives at 60 digits."""
+"""Rates of a rotation, of Euler angles and of quaternions, against derivatives at 60 digits."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from tests.high_precision import about, angular_velocity, array, column, mp, rate
+from tests.high_precision import about, angular_velocity, array, column, mp, rate, turn
 from tests.kinematics.rotation.strategies import ROUNDING, angles, axes, vectors3
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, RepresentationSingularityError
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import (
+    SEQUENCES,
     add_angular_velocities,
+    angular_velocity_from_euler_rates,
+    angular_velocity_from_quaternion_rates,
     angular_velocity_of,
+    euler_condition,
+    euler_rate_inverse,
+    euler_rate_matrix,
+    euler_rates,
     exp_rotation,
+    integrate_orientation,
+    log_rotation,
+    quaternion_of,
+    quaternion_rate_matrix,
+    quaternion_rates,
     rotate_skew,
     rotation_about,
+    rotation_from_euler,
+    rotation_of,
     rotation_rate,
+    singularity_distance,
     skew,
     turning_vector_rate,
 )
@@ -78,3 +94,189 @@ def test_what_is_no_rate_of_a_rotation_is_refused() -> None:
         angular_velocity_of(np.eye(3), np.eye(3))
     with pytest.raises(InputError, match="the same n"):
         add_angular_velocities(np.eye(3)[np.newaxis], np.zeros((2, 3)))
+
+
+# -- euler rates against derivatives at 60 digits, and their singularity, said and measured ------------------
+
+
+ANGLES, RATES = np.array([0.4, 1.3, -2.1]), np.array([0.7, -1.1, 2.3])
+
+
+def moving(name: str) -> Callable[[Any], Any]:
+    """R(t) of the sequence, angles ANGLES + t RATES, written out as a product of three turns."""
+    letters, order = name.lower(), slice(None) if name.isupper() else slice(None, None, -1)
+
+    def R(t: Any) -> Any:
+        turns = [
+            turn(axis, mp.mpf(a) + t * mp.mpf(r)) for axis, a, r in zip(letters, ANGLES, RATES, strict=True)
+        ]
+        first, second, third = turns[order]
+        return first * second * third
+
+    return R
+
+
+@pytest.mark.parametrize("name", SEQUENCES)
+def test_euler_rates_give_the_angular_velocity_and_back(name: str) -> None:
+    w = array(angular_velocity(moving(name), 0.0))
+    assert np.abs(angular_velocity_from_euler_rates(name, ANGLES, RATES) - w).max() <= 2 * ROUNDING
+    assert np.abs(euler_rates(name, ANGLES, w) - RATES).max() <= 16 * ROUNDING
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEQUENCES)
+@settings(max_examples=40)  # for each of 24 sequences
+@given(st.tuples(angles, st.floats(0.2, 1.3), angles))
+def test_the_closed_inverse_is_the_inverse(name: str, turns: tuple[float, float, float]) -> None:
+    product = euler_rate_inverse(name, turns) @ euler_rate_matrix(name, turns)
+    assert np.abs(product - np.eye(3)).max() <= 16 * ROUNDING
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEQUENCES)
+@settings(max_examples=40)  # for each of 24 sequences
+@given(st.floats(-4.0, 4.0))
+def test_the_condition_number_is_that_of_the_matrix(name: str, middle: float) -> None:
+    turns = [0.3, middle, -0.8]
+    if float(singularity_distance(name, turns)) > 1e-3:
+        expected = float(np.linalg.cond(euler_rate_matrix(name, turns)))
+        assert abs(float(euler_condition(name, turns)) / expected - 1.0) <= 1e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "middle"), [("ZYZ", 0.0), ("ZYZ", np.pi), ("xyz", np.pi / 2), ("XYZ", -np.pi / 2)]
+)
+def test_at_the_singularity_the_rates_are_refused_with_the_distance_and_never_infinite(
+    name: str, middle: float
+) -> None:
+    for off in (0.0, 1e-10):
+        with pytest.raises(RepresentationSingularityError, match="representational singularity") as caught:
+            euler_rates(name, [0.1, middle + off, 0.2], [1.0, 0.0, 0.0])
+        assert caught.value.distance == pytest.approx(off, abs=1e-15)
+        assert caught.value.sequence == name
+
+
+def test_the_worst_sample_of_a_batch_is_named() -> None:
+    batch = np.full((2, 3, 3), 1.0)
+    batch[1, 2, 1] = 0.0
+    with pytest.raises(RepresentationSingularityError, match=r"sample \[1, 2\]"):
+        euler_rates("ZYZ", batch, np.ones(3))
+
+
+def test_near_the_singularity_the_condition_grows_as_two_over_the_distance() -> None:
+    for distance in (1e-3, 1e-6, 1e-8):
+        near = [0.0, distance, 0.0]
+        assert float(euler_condition("ZYZ", near)) * distance == pytest.approx(2.0, rel=1e-6)
+        assert np.isfinite(euler_rates("ZYZ", near, [1.0, 2.0, 3.0])).all()
+
+
+def test_the_condition_does_not_exist_at_the_singularity() -> None:
+    with pytest.raises(RepresentationSingularityError):
+        euler_condition("ZYZ", [0.0, 0.0, 0.0])
+
+
+@given(st.floats(-30.0, 30.0))
+def test_the_distance_is_zero_where_and_only_where_the_determinant_is(middle: float) -> None:
+    turns: FloatArray = np.array([0.5, middle, 1.0])
+    for name in ("ZYZ", "zyx"):
+        determinant = abs(float(np.linalg.det(euler_rate_matrix(name, turns))))
+        assert abs(float(np.sin(singularity_distance(name, turns))) - determinant) <= ROUNDING
+
+
+# -- quaternion rates both ways and in both frames, and orientation integrated from them ---------------------
+
+
+def spinning(t: Any) -> Any:
+    return about(column(1, 2, -2), 1 + t) * about(column(3, 0, 4), mp.sin(2 * t) / 2)
+
+
+@pytest.mark.parametrize("frame", ["fixed", "body"])
+def test_quaternion_rates_are_the_derivative_of_the_quaternion(frame: Literal["fixed", "body"]) -> None:
+    def quat(t: float) -> FloatArray:
+        return quaternion_of(array(spinning(mp.mpf(t))))
+
+    t, step = 0.3, 1e-3
+    # Sixth-order differences of the quaternion itself: truncation 1e-19, rounding eps / step.
+    offsets, weights = np.array([1, 2, 3]), np.array([3 / 4, -3 / 20, 1 / 60])
+    slope = sum(
+        w * (quat(t + n * step) - quat(t - n * step)) / step for n, w in zip(offsets, weights, strict=True)
+    )
+    w_fixed = array(angular_velocity(spinning, t))
+    w = w_fixed if frame == "fixed" else array(spinning(mp.mpf(t))).T @ w_fixed
+    assert np.abs(quaternion_rates(quat(t), w, frame) - slope).max() <= ROUNDING / step
+
+
+@pytest.mark.slow
+@given(axes, angles, vectors3)
+def test_angular_velocity_comes_back_and_the_norm_stays(k: FloatArray, phi: float, w: FloatArray) -> None:
+    quat = quaternion_of(rotation_about(k, phi))
+    frames: tuple[Literal["fixed", "body"], ...] = ("fixed", "body")
+    for frame in frames:
+        rates = quaternion_rates(quat, w, frame)
+        assert abs(float(quat @ rates)) <= ROUNDING
+        assert np.abs(angular_velocity_from_quaternion_rates(quat, rates, frame) - w).max() <= ROUNDING
+
+
+@given(axes, angles)
+def test_the_columns_of_the_rate_matrix_are_perpendicular_and_half_long(k: FloatArray, phi: float) -> None:
+    E = quaternion_rate_matrix(quaternion_of(rotation_about(k, phi)))
+    assert np.abs(E.T @ E - np.eye(3) / 4).max() <= ROUNDING
+
+
+@pytest.mark.slow
+@given(axes, angles, vectors3)
+def test_the_body_sees_the_fixed_frames_rates_turned(k: FloatArray, phi: float, w: FloatArray) -> None:
+    R = rotation_about(k, phi)
+    quat = quaternion_of(R)
+    assert np.abs(quaternion_rates(quat, w) - quaternion_rates(quat, R.T @ w, "body")).max() <= ROUNDING
+
+
+def test_an_unknown_frame_is_refused() -> None:
+    with pytest.raises(InputError, match="'fixed' or 'body'"):
+        quaternion_rate_matrix([0, 0, 0, 1], "world")  # type: ignore[arg-type]
+
+
+# -- integration -------------------------------------------------------------------------------------
+
+
+def zyz(t: float) -> FloatArray:
+    return np.array([0.3 * t, 1.0 + 0.4 * np.sin(2.0 * t), t * t])
+
+
+def zyz_rates(t: float) -> FloatArray:
+    return np.array([0.3, 0.8 * np.cos(2.0 * t), 2.0 * t])
+
+
+def wobble(t: float) -> FloatArray:
+    """Angular velocity of a motion whose orientation is known at every time."""
+    return angular_velocity_from_euler_rates("ZYZ", zyz(t), zyz_rates(t))
+
+
+def error(steps: int) -> float:
+    quats = integrate_orientation(
+        wobble, quaternion_of(rotation_from_euler("ZYZ", zyz(0.0))), np.linspace(0, 2, steps + 1)
+    )
+    assert np.abs(np.linalg.norm(quats, axis=-1) - 1.0).max() <= ROUNDING
+    missed = rotation_of(quats[-1]).T @ rotation_from_euler("ZYZ", zyz(2.0))
+    return float(np.linalg.norm(log_rotation(missed)))
+
+
+def test_the_integration_converges_with_the_fourth_power_of_the_step() -> None:
+    errors = np.array([error(steps) for steps in (20, 40, 80, 160)])
+    orders = np.log2(errors[:-1] / errors[1:])
+    assert np.abs(orders - 4.0).max() < 0.25
+    assert errors[-1] < 1e-6
+
+
+def test_the_bodys_own_angular_velocity_integrates_to_the_same_orientation() -> None:
+    def in_body(t: float) -> FloatArray:
+        return rotation_from_euler("ZYZ", zyz(t)).T @ wobble(t)
+
+    start = quaternion_of(rotation_from_euler("ZYZ", zyz(0.0)))
+    quat = integrate_orientation(in_body, start, np.linspace(0, 2, 401), "body")[-1]
+    assert np.abs(rotation_of(quat) - rotation_from_euler("ZYZ", zyz(2.0))).max() < 1e-8
+
+
+def test_times_must_increase() -> None:
+    with pytest.raises(InputError, match="increasing"):
+        integrate_orientation(wobble, [0, 0, 0, 1], [0.0, 0.0])

@@ -1,17 +1,25 @@
-"""Each rule's page is true: its example has the finding, the cured one has not."""
+"""Each rule's page is true; the robots everybody uses; what a comment silences."""
 
+from __future__ import annotations
+
+import importlib.util
 import re
 import tomllib
+import warnings
 from dataclasses import fields
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+import urdfkin
+from tests.urdf.lint.cases.arm import arm
 from tests.urdf.lint.examples import document
 from tests.urdf.lint.others import ask
 from urdfkin.errors import UnknownNameError
-from urdfkin.urdf.findings import Rule
-from urdfkin.urdf.lint import DEFAULT_LIMITS, Limits, check, rules
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.findings import WRITTEN_OUT, Rule
+from urdfkin.urdf.lint import DEFAULT_LIMITS, Limits, Severity, check, rules
 from urdfkin.urdf.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
 
 HERE = Path(rules.__file__).parent
@@ -120,3 +128,89 @@ def test_the_others_do_with_the_bad_example_what_the_page_says(
 ) -> None:
     pinocchio, yourdfpy = re.findall(r"(?:Pinocchio|; yourdfpy) (reads|refuses) it", page(rule.id).others)
     assert verdicts[rule.id] == {"pinocchio": pinocchio, "yourdfpy": yourdfpy}
+
+
+# -- the robots everybody uses: no error, no warning without a word about it, and a page that says so --------
+
+
+SCRIPT = Path(__file__).parents[3] / "scripts" / "make_findings.py"
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_findings", SCRIPT)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", catalogue())
+def test_no_robot_of_the_catalogue_has_an_error(robot: str) -> None:
+    assert [str(finding) for finding in check(robot) if finding.severity is Severity.ERROR] == []
+
+
+def test_the_missing_leaders_are_errors_when_mimic_is_asked_for() -> None:
+    errors = [f for f in check("alex_psyonic_hands", mimic=True) if f.severity is Severity.ERROR]
+    assert [finding.code for finding in errors] == ["URDF520"] * 8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", catalogue())
+def test_no_robot_of_the_catalogue_is_unverifiable(robot: str) -> None:
+    assert [str(finding) for finding in check(robot) if finding.oracle is not None] == []
+
+
+@pytest.mark.slow
+def test_the_page_of_findings_is_current(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    assert script.PAGE.read_text("utf-8") == script.page(), "run python scripts/make_findings.py"
+
+
+@pytest.mark.slow
+def test_a_robot_is_told_a_handful_of_things_at_most(script: ModuleType) -> None:
+    assert max(len(script.warnings_of(robot)) for robot in catalogue()) <= 5
+
+
+# -- what a comment silences is not warned of; what it cannot change stays as it is --------------------------
+
+
+COMMENT = "<!-- urdfkin: ignore[{}] as drawn -->\n"
+
+
+def test_load_does_not_warn_of_it() -> None:
+    text = arm(axis='<axis xyz="0 0 2"/>')
+    with pytest.warns(urdfkin.UrdfWarning, match="URDF503"):
+        urdfkin.load(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        robot = urdfkin.load(COMMENT.format("URDF503") + text.partition("\n")[2])
+    assert list(robot.findings) == []
+
+
+def test_a_robot_that_pinocchio_refuses_stays_unverified() -> None:
+    text = COMMENT.format("URDF303") + arm(head="", origin='<origin xyz="0\t0 1"/>').lstrip()
+    assert check(text) == []
+    robot = urdfkin.load(text)
+    with pytest.warns(urdfkin.NotVerifiedWarning):
+        robot.placement(robot.neutral(), "tool")
+    assert not robot.certificate().verified
+
+
+def test_the_nearest_comment_speaks_and_the_others_are_told_to_be_unused() -> None:
+    text = arm(head="", axis="\n" + COMMENT.format("URDF503") + '<axis xyz="0 0 2"/>').lstrip()
+    (unused,) = check(COMMENT.format("URDF503") + text)
+    assert (unused.code, unused.line) == ("URDF121", 1)
+
+
+@pytest.mark.slow
+def test_more_findings_than_are_written_out_are_silenced_too() -> None:
+    links = '<link name="a"/>' + "<link name='b'/>"
+    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/>{}</joint>'
+    many = "<odd/>" * (WRITTEN_OUT + 5)
+    text = f"<robot name='r'>{links}{joint.format(many)}</robot>"
+    assert len(check(text)) == WRITTEN_OUT
+    assert check(COMMENT.format("URDF207") + text) == []

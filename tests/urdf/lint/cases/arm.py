@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 ACCEPT, WARN, REJECT = "accept", "accept-with-warning", "reject"
 
 
 @dataclass(frozen=True)
 class Case:
-    """One document, its verdict, and the findings it must have among others: (code, line)."""
+    """One document, its verdict, and the findings it must have among others: `CODE:LINE CODE:LINE`."""
 
     name: str
     text: str | bytes
     verdict: str
-    findings: list[tuple[str, int]] = field(default_factory=list)
+    codes: str = ""
+
+    @property
+    def findings(self) -> set[tuple[str, int]]:
+        """Code and line of each."""
+        return {(one.partition(":")[0], int(one.partition(":")[2])) for one in self.codes.split()}
 
     @property
     def data(self) -> bytes:
@@ -62,6 +67,14 @@ def axis(value: str, kind: str = "revolute") -> str:
 
 def limit(value: str, kind: str = "revolute") -> str:
     return arm(limit=f"<limit {value}/>", attributes=f'type="{kind}"')
+
+
+def bounds(value: str, kind: str = "revolute") -> str:
+    return limit(f'{value} effort="1" velocity="1"', kind)
+
+
+def follows(rule: str) -> str:
+    return arm(follow=f"<mimic {rule}/>")
 
 
 def fixed(name: str, parent: str, child: str) -> str:

@@ -1,15 +1,12 @@
 """What an MJCF file says beside its joints: each thing alone, and every word that must be said of it."""
 
-from dataclasses import dataclass
 
-
-@dataclass(frozen=True)
 class Mjcf:
-    """A robot of MJCF, and the findings it must have and no others: (code, message)."""
+    """A robot of MJCF, and the findings it must have and no others: code and message."""
 
-    name: str
-    text: str
-    findings: tuple[tuple[str, str], ...] = ()
+    def __init__(self, name: str, text: str, *findings: str) -> None:
+        self.name, self.text = name, text
+        self.findings = [tuple(one.split(" ", 1)) for one in findings]
 
 
 _LIMITED = 'limited="true" range="-1 1"'
@@ -46,62 +43,53 @@ CASES = [
     Mjcf(
         "a-weld",
         _held('<weld name="glue" body1="one" body2="two"/>'),
-        (("MJCF101", "equality glue: a constraint (weld of one and two) that a tree cannot represent"),),
+        "MJCF101 equality glue: a constraint (weld of one and two) that a tree cannot represent",
     ),
     Mjcf(
         "a-connection",
         _held('<connect name="pin" body1="one" body2="two" anchor="0 0 0"/>'),
-        (("MJCF101", "equality pin: a constraint (connect of one and two) that a tree cannot represent"),),
+        "MJCF101 equality pin: a constraint (connect of one and two) that a tree cannot represent",
     ),
     Mjcf(
         "a-curve-between-two-joints",
         _held('<joint name="bent" joint1="b" joint2="a" polycoef="0 0 1 0 0"/>'),
-        (("MJCF101", "equality bent: a constraint (b and a) that is not linear in one other joint"),),
+        "MJCF101 equality bent: a constraint (b and a) that is not linear in one other joint",
     ),
     Mjcf(
         "a-joint-held-twice",
         _held('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="b" joint2="a"/>'),
-        (("MJCF101", "equality y: joint b has two rules, or its rules form a circle"),),
+        "MJCF101 equality y: joint b has two rules, or its rules form a circle",
     ),
     Mjcf(
         "two-joints-that-hold-each-other",
         _held('<joint name="x" joint1="b" joint2="a"/>', '<joint name="y" joint1="a" joint2="b"/>'),
-        (("MJCF101", "equality y: joint a has two rules, or its rules form a circle"),),
+        "MJCF101 equality y: joint a has two rules, or its rules form a circle",
     ),
     Mjcf(
         "a-constraint-that-is-off",
         _held('<joint name="x" joint1="b" joint2="a" active="false"/>'),
-        (("MJCF102", "equality x: a constraint that is not active"),),
+        "MJCF102 equality x: a constraint that is not active",
     ),
     Mjcf(
         "a-tendon",
         _two(inside='<site name="s"/>', world='<site name="r"/>', more=_SPATIAL),
-        (("MJCF101", "tendons: tendons have no effect here"), ("MJCF102", f"{_USELESS}1 tendons")),
+        "MJCF101 tendons: tendons have no effect here",
+        f"MJCF102 {_USELESS}1 tendons",
     ),
     Mjcf(
         "a-mocap-body",
         _two(world='<body name="hand" mocap="true"/>'),
-        (("MJCF101", "body hand: a mocap body is fixed at its pose in the file"),),
+        "MJCF101 body hand: a mocap body is fixed at its pose in the file",
     ),
     Mjcf(
         "a-slide-without-limits",
         _two(joint='type="slide"'),
-        (
-            (
-                "MJCF102",
-                "joint b: a slide joint without limits: the URDF, which requires limits, has +-1000 m",
-            ),
-        ),
+        "MJCF102 joint b: a slide joint without limits: the URDF, which requires limits, has +-1000 m",
     ),
     Mjcf(
         "radians-in-a-file-in-degrees",
         _two(joint='type="hinge" limited="true" range="-1.5 3.1416"'),
-        (
-            (
-                "MJCF201",
-                "compiler: the largest limit of a hinge is 3.142 degrees: the limits are probably radians",
-            ),
-        ),
+        "MJCF201 compiler: the largest limit of a hinge is 3.142 degrees: the limits are probably radians",
     ),
     Mjcf(
         "ten-turns-in-a-file-in-radians",
@@ -122,13 +110,8 @@ CASES = [
     Mjcf(
         "a-free-body-that-stands-elsewhere",
         _two(joint='type="free"', body='pos="0 0 1"'),
-        (
-            (
-                "MJCF102",
-                "joint b: qpos0 places this body at (0, 0, 1); in the neutral configuration the body is"
-                " at the origin",
-            ),
-        ),
+        "MJCF102 joint b: qpos0 places this body at (0, 0, 1); in the neutral configuration the body is"
+        " at the origin",
     ),
     Mjcf(
         "shapes-lights-and-motors",
@@ -136,6 +119,6 @@ CASES = [
             inside='<geom size="0.1"/><geom size="0.2"/><light/><camera/>',
             more='<actuator><motor joint="a"/></actuator>',
         ),
-        (("MJCF102", f"{_USELESS}1 actuators, 2 geoms, 1 cameras, 1 lights"),),
+        f"MJCF102 {_USELESS}1 actuators, 2 geoms, 1 cameras, 1 lights",
     ),
 ]

@@ -1,13 +1,19 @@
-"""The factory's calibration of a Universal Robots arm, from the driver's YAML or the controller's table."""
+"""Files of a calibration: measured poses, the factory's numbers of a Universal Robots arm, the new URDF."""
 
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from tests.calibration.arms import BRANCHED, pose
+from tests.cli.running import urdfkin
+from urdfkin.calibration.calibrate import read_poses
 from urdfkin.calibration.universal_robots import (
     LINKS,
     calibrated_tree,
@@ -15,14 +21,98 @@ from urdfkin.calibration.universal_robots import (
     read_calibration,
     universal_robots,
 )
+from urdfkin.calibration.write_back import nearest_rpy, with_origins
 from urdfkin.dh.rows import table_from_rows
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation import euler_of
+from urdfkin.kinematics.rotation import euler_of, quaternion_of, rotation_from_rpy
 from urdfkin.model.chain import chain
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot.loading import load
+from urdfkin.system.files import Edit, edited
+
+NAMES = ("a", "b")
+Q = np.array([[0.1, 0.2], [0.3, 0.4], [-0.5, 0.6]])
+T = np.stack([pose(k, 1.0) for k in range(3)])
+
+
+def csv(path: Path, header: str, rows: FloatArray) -> Path:
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.17g")
+    return path
+
+
+def test_every_form_reads_the_same(tmp_path: Path) -> None:
+    quat, p = quaternion_of(T[:, :3, :3]), T[:, :3, 3]
+    columns = "qw,qx,qy,qz,x,y,z,b,a"
+    rows = np.hstack([np.roll(quat, 1, axis=1), p, Q[:, ::-1]])
+    matrices = ",".join(f"T{i}{j}" for i in range(4) for j in range(4))
+    np.savez(tmp_path / "T.npz", q=Q, T=T)
+    np.savez(tmp_path / "p.npz", q=Q, p=1e3 * p, quat=quat)
+    for path, unit in (
+        (csv(tmp_path / "quat.csv", columns, rows), "m"),
+        (csv(tmp_path / "T.csv", f"a,b,{matrices}", np.hstack([Q, T.reshape(3, 16)])), "m"),
+        (tmp_path / "T.npz", "m"),
+        (tmp_path / "p.npz", "mm"),
+    ):
+        q, found = read_poses(path, NAMES, NAMES, unit)
+        assert (q == Q).all()
+        np.testing.assert_allclose(found, T, atol=1e-15)
+
+
+def test_a_quaternion_with_few_digits_is_brought_to_length_one(tmp_path: Path) -> None:
+    quat = quaternion_of(T[:, :3, :3])
+    rows = np.hstack([quat * 1.0009, T[:, :3, 3], Q])
+    found = read_poses(csv(tmp_path / "long.csv", "qx,qy,qz,qw,x,y,z,a,b", rows), NAMES, NAMES)[1]
+    np.testing.assert_allclose(found, T, atol=1e-15)
+
+
+def test_positions_alone_are_positions_alone(tmp_path: Path) -> None:
+    path = csv(tmp_path / "p.csv", "a,x,y,z", np.hstack([Q[:, :1], 1e3 * T[:, :3, 3]]))
+    q, p = read_poses(path, NAMES, ("a",), "mm")
+    assert (q == Q * [1.0, 0.0]).all()
+    np.testing.assert_allclose(p, T[:, :3, 3], atol=1e-15)
+    np.savez(tmp_path / "p.npz", q=Q, p=T[:, :3, 3])
+    assert (read_poses(tmp_path / "p.npz", NAMES, NAMES)[1] == T[:, :3, 3]).all()
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("a,b,x,y", "missing: z"),
+        ("a,x,y,z", "missing: b"),
+        ("a,b,x,y,z,qw", "no qx, qy, qz"),
+        ("a,b,x,y,z,roll", "unknown: roll"),
+        ("a,b,x,y,z,qx,qy,qz,qw", "length 2"),
+        ("a,b,T00,T01,T02,T03,T10,T11,T12,T13,T20,T21,T22,T23", "a pose must be a rotation"),
+    ],
+)
+def test_what_is_wrong_with_columns_is_told(header: str, words: str, tmp_path: Path) -> None:
+    path = csv(tmp_path / "x.csv", header, np.ones((2, header.count(",") + 1)))
+    with pytest.raises(InputError) as error:
+        read_poses(path, NAMES, NAMES)
+    assert words in str(error.value)
+
+
+def test_what_is_wrong_with_arrays_is_told(tmp_path: Path) -> None:
+    np.savez(tmp_path / "x.npz", q=Q, T=T, p=T[:, :3, 3])
+    with pytest.raises(InputError, match="`q` and `T`, `q` and `p`, or `q`, `p` and `quat`: found q, T, p"):
+        read_poses(tmp_path / "x.npz", NAMES, NAMES)
+
+
+def test_what_placement_writes_is_read(tmp_path: Path) -> None:
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 2))
+    (tmp_path / "q.csv").write_text("\n".join(f"{a!r},{b!r}" for a, b in q.tolist()))
+    done = urdfkin("placement", "planar_two_link", "--q", f"@{tmp_path}/q.csv", "--format", "csv")
+    lines = done.text.splitlines()
+    names = ("joint_1", "joint_2")
+    rows = [",".join([line, *map(repr, row)]) for line, row in zip(lines[1:], q.tolist(), strict=True)]
+    (tmp_path / "poses.csv").write_text("\n".join([f"{lines[0]},{','.join(names)}", *rows]))
+    assert (read_poses(tmp_path / "poses.csv", names, names)[0] == q).all()
+
+
+# The factory's calibration of a Universal Robots arm, from the driver's YAML or the controller's table.
+
 
 #: theta, d, a, alpha of a real UR10e, from the driver's documentation: the upper arm is 439 m out.
 CONTROLLER = np.array(
@@ -200,3 +290,97 @@ def test_another_robot_and_another_order_are_told(file: Path) -> None:
         universal_robots("panda", file)
     with pytest.raises(UnknownNameError, match="driver"):
         universal_robots("ur5", file, "drivers")
+
+
+# -- a URDF gets new origins, and keeps every other byte -----------------------------------------------------
+
+
+ORIGINS = {name: pose(k, 0.5) for k, name in enumerate(["one", "two", "three", "fix"])}
+
+
+def blank(data: bytes) -> bytes:
+    """A text without its origins' values."""
+    return re.sub(rb"""(<origin\b[^>]*?)((?:\s+\w+\s*=\s*(?:"[^"]*"|'[^']*'))+)""", rb"\1", data)
+
+
+def origins(data: bytes) -> dict[str, FloatArray]:
+    robot = load(data, verify=False)
+    return {joint.name: joint.T_parent_joint for joint in robot.tree.joints}
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_every_other_byte_stays_and_the_new_origins_are_read(end: str, mark: bytes) -> None:
+    old = mark + BRANCHED.replace("\n", end).encode()
+    new = with_origins(old, ORIGINS)
+    # The joint that had no origin has one before its parent.
+    assert blank(new).replace(b'type="prismatic"><origin/>', b'type="prismatic">') == blank(old)
+    found = origins(new)
+    for name, T in ORIGINS.items():
+        assert np.abs(found[name] - T).max() < 1e-14
+    assert (found["four"] == origins(old)["four"]).all()
+
+
+def test_lines_without_a_moved_joint_stay_and_quotes_and_order_too() -> None:
+    text = BRANCHED.encode()
+    old, new = (data.splitlines() for data in (text, with_origins(text, {"one": ORIGINS["one"]})))
+    assert [k for k, pair in enumerate(zip(old, new, strict=True)) if pair[0] != pair[1]] == [6]
+    assert re.fullmatch(rb"""    <origin xyz="\S+ \S+ \S+"   rpy='\S+ \S+ \S+'/>""", new[6])
+
+
+def test_a_number_that_stays_keeps_its_digits() -> None:
+    text = BRANCHED.replace('xyz="0.1 0.2 0.3"', 'xyz="1e-1 .20 0.3"').encode()
+    T = origins(text)["one"].copy()
+    assert with_origins(text, {"one": T}) == text
+    T[2, 3] += 0.001
+    assert with_origins(text, {"one": T}) == text.replace(b"1e-1 .20 0.3", b"1e-1 .20 0.301")
+
+
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+def test_a_quaternion_stays_a_quaternion() -> None:
+    text = BRANCHED.replace('name="branched"', 'name="branched" version="1.1"')
+    text = text.replace('<origin xyz="0.4 0 0.1"/>', '<origin xyz="0.4 0 0.1" quat_xyzw="0 0 -0.6 -0.8"/>')
+    drawn = origins(text.encode())["four"].copy()
+    new = with_origins(text.encode(), {"four": drawn @ pose(3, 0.1)})
+    assert np.abs(origins(new)["four"] - drawn @ pose(3, 0.1)).max() < 1e-14
+    assert b"rpy" not in next(line for line in new.splitlines() if b"quat_xyzw" in line)
+    written = re.search(rb'quat_xyzw="([^"]*)"', new)
+    assert written is not None
+    assert np.dot([float(x) for x in written[1].split()], [0, 0, -0.6, -0.8]) > 0.0
+
+
+def test_a_follower_that_cannot_follow_is_no_reason_to_refuse() -> None:
+    text = BRANCHED.replace('<axis xyz="0 -1 0"/>', '<axis xyz="0 -1 0"/><mimic joint="nobody"/>').encode()
+    assert b'<mimic joint="nobody"/>' in with_origins(text, {"one": ORIGINS["one"]})
+
+
+def test_what_has_errors_or_no_such_joint_is_not_edited() -> None:
+    with pytest.raises(InputError, match="a URDF with errors is not edited"):
+        with_origins(b"<robot>", {})
+    with pytest.raises(InputError, match="no such joint"):
+        with_origins(BRANCHED.encode(), {"five": np.eye(4)})
+    with pytest.raises(InputError, match="two edits overlap"):
+        edited(b"abc", [Edit(0, 2), Edit(1, 3)])
+
+
+angles = st.floats(-7.0, 7.0)
+
+
+@given(st.tuples(angles, angles, angles), st.tuples(*[st.floats(-1e-3, 1e-3)] * 3))
+def test_of_all_angles_the_nearest_are_written(
+    old: tuple[float, float, float], by: tuple[float, float, float]
+) -> None:
+    wanted = np.array(old) + by
+    R = rotation_from_rpy(wanted)
+    found = nearest_rpy(R, old)
+    assert np.abs(rotation_from_rpy(found) - R).max() < 1e-14
+    assert np.abs(found - old).sum() <= np.abs(by).sum() + 1e-12 / max(abs(np.cos(wanted[1])), 1e-16)
+
+
+@pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
+def test_where_roll_and_yaw_are_one_the_roll_stays(pitch: float) -> None:
+    R = np.round(rotation_from_rpy([0.0, pitch, 0.5]), 16)
+    R[:2, 0] = R[2, 1:] = 0.0
+    found = nearest_rpy(R, (0.3, pitch, 0.0))
+    assert found[0] == 0.3
+    assert np.abs(rotation_from_rpy(found) - R).max() < 1e-15

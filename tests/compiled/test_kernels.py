@@ -1,0 +1,183 @@
+"""Kernels: batches, the parts of an acceleration and the rate of the Jacobian."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.odd_tree import odd_tree, pose, state
+from urdfkin.compiled import evaluate
+from urdfkin.compiled.breakdown import KINDS, acceleration_breakdown
+from urdfkin.compiled.evaluate import accelerations, in_blocks, jacobian_rates
+from urdfkin.compiled.plan import LANES, compile_tree
+from urdfkin.errors import InputError
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.reference import Reference
+from urdfkin.model.tree import KinematicTree
+
+
+@pytest.fixture(scope="module")
+def panda() -> urdfkin.Robot:
+    return urdfkin.load("panda", verify=False)
+
+
+@pytest.mark.parametrize("n", [1, LANES - 1, LANES, LANES + 1, 5 * LANES + 3])
+def test_results_are_equal_to_the_last_bit_for_any_number_of_threads(panda: urdfkin.Robot, n: int) -> None:
+    q = panda.sample(n, seed=3)
+    v, a = np.random.default_rng(3).standard_normal((2, n, panda.nv))
+    for reference in urdfkin.Reference:
+        one = panda.acceleration(q, v, a, "panda_hand", reference, threads=1)
+        jacobian = panda.jacobian(q, "panda_hand", reference, threads=1)
+        for threads in (2, 3, 64):
+            many = panda.acceleration(q, v, a, "panda_hand", reference, threads=threads)
+            np.testing.assert_array_equal(many, one)
+            again = panda.jacobian(q, "panda_hand", reference, threads=threads)
+            np.testing.assert_array_equal(again, jacobian)
+
+
+def test_a_batch_large_enough_for_threads_by_itself_is_the_same(panda: urdfkin.Robot) -> None:
+    q = panda.sample(5000, seed=5)
+    alone = panda.placement(q, "panda_hand", threads=1)
+    np.testing.assert_array_equal(panda.placement(q, "panda_hand"), alone)
+
+
+@pytest.mark.parametrize("offset", range(8))
+@pytest.mark.parametrize("n", [1, LANES, 3 * LANES + 5])
+def test_what_is_written_past_the_caches_is_the_same_wherever_it_begins(
+    panda: urdfkin.Robot, monkeypatch: pytest.MonkeyPatch, offset: int, n: int
+) -> None:
+    q = panda.sample(n, seed=7)
+    v, a = np.random.default_rng(7).standard_normal((2, n, panda.nv))
+    frames = ["panda_hand", "panda_link3"]
+    jacobians, accelerations = panda.jacobian(q, frames), panda.acceleration(q, v, a, frames)
+    monkeypatch.setattr(evaluate, "_STREAMED", 0)
+    for threads in (1, 2):
+        with _between(jacobians, offset) as out:
+            panda.jacobian(q, frames, out=out, threads=threads)
+        with _between(accelerations, offset) as out:
+            panda.acceleration(q, v, a, frames, out=out, threads=threads)
+
+
+@contextmanager
+def _between(expected: FloatArray, offset: int) -> Iterator[FloatArray]:
+    """Memory to be filled with what is expected; what lies before and behind it must stay."""
+    around = np.full(expected.size + 16, np.pi)
+    out = around[offset : offset + expected.size].reshape(expected.shape)
+    yield out
+    np.testing.assert_array_equal(out, expected)
+    assert (around[:offset] == np.pi).all()
+    assert (around[offset + expected.size :] == np.pi).all()
+
+
+def test_less_than_one_thread_is_refused(panda: urdfkin.Robot) -> None:
+    with pytest.raises(InputError, match="threads"):
+        panda.placement(panda.neutral(), "panda_hand", threads=0)
+
+
+def test_what_was_bad_in_any_part_is_told() -> None:
+    def compute(inputs: Sequence[FloatArray], out: FloatArray) -> int:
+        out[:] = inputs[1][:, :1]
+        return int(inputs[1][:, 0].max())
+
+    base, out = np.zeros((1, 24)), np.empty((5 * LANES, 1))
+    for bad in (None, 0, 2 * LANES, 5 * LANES - 1):
+        q = np.zeros((5 * LANES, 3))
+        if bad is not None:
+            q[bad] = 1.0
+        for threads in (1, 2):
+            assert in_blocks(compute, [base, q], out, threads) == int(bad is not None)
+            np.testing.assert_array_equal(out[:, 0], q[:, 0])
+
+
+def test_a_single_configuration_gives_the_same_bits_whatever_lies_beside_it(panda: urdfkin.Robot) -> None:
+    q = panda.sample(1, seed=6)
+    expected = panda.placement(q[0], "panda_hand")
+    for neighbour in (np.nan, 1e300, -7.0):
+        memory = np.full((3, panda.nq), neighbour)
+        memory[0] = q[0]
+        np.testing.assert_array_equal(panda.placement(memory[:1], "panda_hand"), expected[None])
+
+
+# -- the parts of an acceleration: each is what it says, and together they are the whole ---------------------
+
+
+ROOM = 64 * np.finfo(np.float64).eps * 30.0
+
+
+@pytest.fixture(scope="module")
+def odd() -> KinematicTree:
+    return odd_tree()
+
+
+@pytest.mark.parametrize("reference", list(Reference))
+@pytest.mark.parametrize("link", ["base", "body", "wrist", "tyre"])
+def test_the_parts_add_up_to_the_recursions_acceleration(
+    odd: KinematicTree, link: str, reference: Reference
+) -> None:
+    at = odd.link_index(link)
+    q, v, a = state(odd, 21, 1)
+    generator = np.random.default_rng(2)
+    base = BaseMotion(pose(generator), generator.normal(size=6), generator.normal(size=6)).state(())
+    parts = acceleration_breakdown(odd, at, q, v, a, reference, base)
+    whole = accelerations(compile_tree(odd, [at]), q, v, a, reference, base=base)[:, 0]
+    assert np.abs(parts.total - whole).max() <= ROOM
+    assert np.abs(parts.base + parts.by_kind.sum(axis=-2) - whole).max() <= ROOM
+
+
+def test_a_joint_that_stands_still_contributes_nothing(odd: KinematicTree) -> None:
+    q, v, a = state(odd, 3, 3)
+    slide = odd.v_index[odd.joint_index("slide")]
+    v[:, slide] = a[:, slide] = 0.0
+    parts = acceleration_breakdown(odd, odd.link_index("wrist"), q, v, a)
+    assert parts.joints == ("free", "arm", "slide", "follower")
+    assert not parts.by_joint[:, 2].any()
+    assert parts.by_joint[:, 1].all()
+    # The wrist turns about its own origin: it moves nothing there, it only turns.
+    assert not parts.by_joint[:, 3, :3].any()
+    assert parts.by_joint[:, 3, 3:].all()
+
+
+def test_doubling_a_rate_and_an_acceleration_scales_each_kind_as_its_formula_says(odd: KinematicTree) -> None:
+    q, v, a = state(odd, 3, 4)
+    wrist, slide = odd.link_index("wrist"), odd.v_index[odd.joint_index("slide")]
+    once = acceleration_breakdown(odd, wrist, q, v, a).terms[:, 2]
+    v[:, slide] *= 2.0
+    a[:, slide] *= 3.0
+    now = acceleration_breakdown(odd, wrist, q, v, a).terms[:, 2]
+    for kind, factor in (("coriolis", 2.0), ("sliding", 3.0)):
+        at = KINDS.index(kind)
+        assert np.abs(now[:, at] - factor * once[:, at]).max() <= ROOM
+        assert once[:, at, :3].all()
+    for kind in ("transverse", "centripetal"):
+        assert not now[:, KINDS.index(kind)].any()
+
+
+def test_a_batch_may_be_empty(odd: KinematicTree) -> None:
+    q, v, a = state(odd, 1, 5)
+    assert acceleration_breakdown(odd, 5, q[:0], v[:0], a[:0]).total.shape == (0, 6)
+
+
+# -- the rate of the Jacobian: a derivative, a part of the acceleration, in three references -----------------
+
+
+EPS = np.finfo(np.float64).eps
+
+
+def test_a_plan_for_one_frame_and_a_row_of_one_give_the_same(odd: KinematicTree) -> None:
+    q, v, _ = state(odd, 35, 6)
+    whole = jacobian_rates(compile_tree(odd, range(len(odd.links))), q, v)
+    tyre = odd.link_index("tyre")
+    alone = jacobian_rates(compile_tree(odd, [tyre]), q, v)[:, 0]
+    assert np.abs(alone - whole[:, tyre]).max() <= 4 * EPS
+    first = jacobian_rates(compile_tree(odd, [tyre]), q[:1], v[:1])[0, 0]
+    assert np.abs(first - alone[0]).max() <= 4 * EPS
+
+
+def test_it_vanishes_when_nothing_moves_and_for_an_empty_batch(odd: KinematicTree) -> None:
+    plan = compile_tree(odd, [odd.link_index("wrist")])
+    q, v, _ = state(odd, 3, 8)
+    assert not jacobian_rates(plan, q, np.zeros_like(v)).any()
+    assert jacobian_rates(plan, q[:0], v[:0]).shape == (0, 1, 6, odd.nv)

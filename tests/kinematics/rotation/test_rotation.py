@@ -1,0 +1,259 @@
+"""Rotations: SciPy and Pinocchio agree, and each description comes back."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from tests.kinematics.rotation.strategies import ROUNDING, angles, axes, vectors3
+from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.kinematics.inputs import FloatArray, determinant
+from urdfkin.kinematics.rotation import (
+    SEQUENCES,
+    axis_aligning,
+    axis_angle_of,
+    conjugate,
+    euler_of,
+    exp_rotation,
+    log_rotation,
+    multiply,
+    quaternion_of,
+    rotation_about,
+    rotation_from_euler,
+    rotation_from_rpy,
+    rotation_of,
+    rpy_of,
+    skew,
+    unskew,
+)
+
+
+@pytest.mark.slow
+@given(axes, angles)
+def test_rotation_about_is_scipys_and_pinocchios(axis: FloatArray, angle: float) -> None:
+    R = rotation_about(axis, angle)
+    assert np.abs(R - Rotation.from_rotvec(angle * axis).as_matrix()).max() <= ROUNDING * max(1.0, abs(angle))
+    assert np.abs(R - pin.AngleAxis(angle, axis).toRotationMatrix()).max() <= ROUNDING
+    assert np.abs(R @ R.T - np.eye(3)).max() <= ROUNDING
+    assert abs(float(determinant(R)) - 1.0) <= ROUNDING
+
+
+@pytest.mark.slow
+@given(axes, angles)
+def test_exp_is_pinocchios_exp3(axis: FloatArray, angle: float) -> None:
+    assert np.abs(exp_rotation(angle * axis) - pin.exp3(angle * axis)).max() <= ROUNDING * max(1, abs(angle))
+
+
+@pytest.mark.slow
+@given(axes, angles)
+def test_log_undoes_exp_also_at_half_a_turn(axis: FloatArray, angle: float) -> None:
+    R = rotation_about(axis, angle)
+    vector = log_rotation(R)
+    assert np.linalg.norm(vector) <= np.pi * (1 + ROUNDING)
+    assert np.abs(exp_rotation(vector) - R).max() <= ROUNDING
+
+
+@pytest.mark.slow
+@given(axes)
+def test_log_is_pinocchios_log3_away_from_half_a_turn(axis: FloatArray) -> None:
+    # Near half a turn Pinocchio's own error grows; there the law above is the test.
+    for angle in (0.0, 1e-9, 1e-4, 0.3, 1.0, 2.0):
+        R = pin.exp3(angle * axis)
+        assert np.abs(log_rotation(R) - pin.log3(R)).max() <= 4 * ROUNDING
+
+
+def test_axis_and_angle_come_back() -> None:
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    for angle in (1e-12, 0.5, 3.0, np.pi - 1e-9):
+        found, size = axis_angle_of(rotation_about(axis, angle))
+        assert abs(float(size) - angle) <= ROUNDING
+        assert np.abs((found - axis) * angle).max() <= ROUNDING
+
+
+def test_no_rotation_has_the_axis_z_and_no_angle() -> None:
+    axis, angle = axis_angle_of(np.eye(3))
+    assert axis.tolist() == [0.0, 0.0, 1.0]
+    assert float(angle) == 0.0
+
+
+def test_half_a_turn_about_each_axis_keeps_the_axis() -> None:
+    for axis in np.vstack((np.eye(3), [[0.6, 0.8, 0.0]])):
+        found, angle = axis_angle_of(2.0 * np.outer(axis, axis) - np.eye(3))
+        assert np.abs(np.abs(found @ axis) - 1.0) <= ROUNDING
+        assert float(angle) == np.pi
+
+
+def test_an_axis_of_another_length_is_refused() -> None:
+    with pytest.raises(InputError, match=r"axis must be a unit vector: found norm 2.*divide it"):
+        rotation_about([0.0, 0.0, 2.0], 1.0)
+
+
+def test_what_is_no_rotation_is_refused() -> None:
+    with pytest.raises(InputError, match="R must be a rotation"):
+        log_rotation(2.0 * np.eye(3))
+    with pytest.raises(InputError, match="reflection"):
+        log_rotation(np.diag([1.0, 1.0, -1.0]))
+
+
+@pytest.mark.slow
+@given(axes)
+def test_the_aligning_rotation_has_the_axis_as_its_z(axis: FloatArray) -> None:
+    R = axis_aligning(axis)
+    assert np.array_equal(R[:, 2], axis + 0.0)
+    assert np.abs(R @ R.T - np.eye(3)).max() <= ROUNDING
+    assert abs(float(determinant(R)) - 1.0) <= ROUNDING
+
+
+def test_coordinate_axes_are_aligned_without_rounding() -> None:
+    axes_both_ways = np.vstack((np.eye(3), -np.eye(3)))
+    Rs = axis_aligning(axes_both_ways)
+    assert np.isin(Rs, (-1.0, 0.0, 1.0)).all()
+    assert np.array_equal(Rs[:, :, 2], axes_both_ways)
+    assert np.array_equal(axis_aligning([0.0, 0.0, 1.0]), np.eye(3))
+
+
+# -- three angles and a rotation, there and back, in all 24 sequences ----------------------------------------
+
+
+three_angles = st.tuples(angles, angles, angles)
+
+
+def test_there_are_twelve_turning_and_twelve_fixed_sequences() -> None:
+    assert len(set(SEQUENCES)) == 24
+    assert sum(name.isupper() for name in SEQUENCES) == 12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEQUENCES)
+@settings(max_examples=40)  # for each of 24 sequences
+@given(three_angles)
+def test_a_rotation_from_angles_is_scipys(name: str, turns: tuple[float, float, float]) -> None:
+    expected = Rotation.from_euler(name, turns).as_matrix()
+    assert np.abs(rotation_from_euler(name, turns) - expected).max() <= ROUNDING
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEQUENCES)
+@settings(max_examples=40)  # for each of 24 sequences
+@given(three_angles)
+def test_angles_of_a_rotation_give_it_back_at_the_singularity_too(
+    name: str, turns: tuple[float, float, float]
+) -> None:
+    R = rotation_from_euler(name, turns)
+    found = euler_of(name, R)
+    assert np.abs(rotation_from_euler(name, found) - R).max() <= ROUNDING
+    low, high = (0.0, np.pi) if name[0] == name[2] else (-np.pi / 2, np.pi / 2)
+    assert low <= found[1] <= high
+
+
+@pytest.mark.parametrize("name", SEQUENCES)
+def test_angles_inside_the_range_come_back_themselves(name: str) -> None:
+    middle = 1.1 if name[0] == name[2] else -0.7
+    assert (
+        np.abs(euler_of(name, rotation_from_euler(name, [0.3, middle, -2.0])) - [0.3, middle, -2.0]).max()
+        < 1e-14
+    )
+
+
+@given(three_angles)
+def test_rpy_is_pinocchios(rpy: tuple[float, float, float]) -> None:
+    assert np.abs(rotation_from_rpy(rpy) - pin.rpy.rpyToMatrix(np.array(rpy))).max() <= ROUNDING
+
+
+@given(three_angles)
+def test_rpy_of_any_rotation_gives_it_back_to_rounding(rpy: tuple[float, float, float]) -> None:
+    R = rotation_from_rpy(rpy)
+    assert np.abs(rotation_from_rpy(rpy_of(R)) - R).max() <= ROUNDING
+
+
+@given(st.sampled_from([0.5, -0.5]), angles, st.sampled_from([0.0, 1e-17, 1e-12, 1e-9, 1e-8, 1e-5]))
+def test_rpy_is_exact_through_gimbal_lock(half: float, yaw: float, off: float) -> None:
+    R = rotation_about([0.0, 0.0, 1.0], yaw) @ rotation_about([0.0, 1.0, 0.0], half * np.pi - off)
+    assert np.abs(rotation_from_rpy(rpy_of(R)) - R).max() <= ROUNDING
+
+
+def test_exact_gimbal_lock_has_no_yaw() -> None:
+    straight_up = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    assert rpy_of(straight_up).tolist() == [0.0, np.pi / 2, 0.0]
+    assert rpy_of(np.eye(3)).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_batches_are_their_members() -> None:
+    turns = np.random.default_rng(3).uniform(-3.0, 3.0, (2, 5, 3))
+    Rs = rotation_from_euler("XZX", turns)
+    assert Rs.shape == (2, 5, 3, 3)
+    assert np.array_equal(euler_of("XZX", Rs)[1, 3], euler_of("XZX", Rs[1, 3]))
+    assert euler_of("zyx", np.zeros((0, 3, 3))).shape == (0, 3)
+
+
+def test_an_unknown_sequence_offers_the_nearest_names() -> None:
+    with pytest.raises(UnknownNameError, match="unknown Euler sequence 'ZYy'"):
+        rotation_from_euler("ZYy", [0.0, 0.0, 0.0])
+
+
+# -- quaternions are SciPy's, scalar last, and multiply like rotations ---------------------------------------
+
+
+@pytest.mark.slow
+@given(axes, angles)
+def test_quaternion_and_rotation_are_each_others_inverse(axis: FloatArray, angle: float) -> None:
+    R = rotation_about(axis, angle)
+    quat = quaternion_of(R)
+    assert quat[3] >= 0.0
+    assert np.abs(rotation_of(quat) - R).max() <= ROUNDING
+    assert np.abs(Rotation.from_quat(quat).as_matrix() - R).max() <= ROUNDING
+
+
+@pytest.mark.slow
+@given(axes, angles, axes, angles)
+def test_a_product_of_quaternions_is_the_product_of_rotations(
+    k: FloatArray, phi: float, m: FloatArray, psi: float
+) -> None:
+    p, q = quaternion_of(rotation_about(k, phi)), quaternion_of(rotation_about(m, psi))
+    assert np.abs(rotation_of(multiply(p, q)) - rotation_of(p) @ rotation_of(q)).max() <= 2 * ROUNDING
+
+
+@pytest.mark.slow
+@given(axes, angles)
+def test_the_conjugate_is_the_inverse(axis: FloatArray, angle: float) -> None:
+    quat = quaternion_of(rotation_about(axis, angle))
+    assert np.abs(multiply(quat, conjugate(quat)) - [0, 0, 0, 1]).max() <= ROUNDING
+
+
+def test_a_quaternion_that_is_not_of_unit_length_is_refused() -> None:
+    with pytest.raises(InputError, match="unit quaternion: found norm 2"):
+        rotation_of([0.0, 0.0, 0.0, 2.0])
+
+
+# -- the skew matrix is the cross product, and gives its vector back -----------------------------------------
+
+
+@pytest.mark.slow
+@given(vectors3, vectors3)
+def test_the_skew_matrix_times_a_vector_is_the_cross_product(w: FloatArray, p: FloatArray) -> None:
+    assert np.abs(skew(w) @ p - np.cross(w, p)).max() <= ROUNDING
+
+
+@given(vectors3)
+def test_unskew_undoes_skew_exactly(w: FloatArray) -> None:
+    assert np.array_equal(unskew(skew(w)), w)
+
+
+def test_any_leading_shape_is_kept_empty_ones_too() -> None:
+    assert skew(np.ones((4, 0, 3))).shape == (4, 0, 3, 3)
+    assert unskew(np.zeros((4, 0, 3, 3))).shape == (4, 0, 3)
+    w = np.arange(12.0).reshape(2, 2, 3)
+    assert np.array_equal(skew(w)[1, 0], skew(w[1, 0]))
+
+
+def test_a_matrix_that_is_not_skew_is_refused_with_its_symmetric_part() -> None:
+    with pytest.raises(InputError, match=r"skew-symmetric.*symmetric part of 1"):
+        unskew(np.eye(3))
+
+
+@pytest.mark.parametrize("bad", [[1.0, 2.0], 3.0, [1.0, 2.0, np.nan], "abc", [np.inf, 0, 0]])
+def test_what_is_no_finite_vector_is_refused(bad: object) -> None:
+    with pytest.raises(InputError, match="w must"):
+        skew(bad)  # type: ignore[arg-type]

@@ -1,0 +1,405 @@
+"""The libraries that check: the Pinocchio in use, MuJoCo, and yourdfpy as the second reader."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from scripts.fuzzing import robots
+from tests.cli.running import Done, process
+from tests.urdf.lint.cases.arm import arm, fixed
+from urdfkin.errors import InstallationError, UnknownNameError
+from urdfkin.model.reference import Reference
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.validation.campaign import validate
+from urdfkin.validation.outcome import Verdict
+from urdfkin.verify import oracles, second_reader
+from urdfkin.verify.mujoco import MujocoOracle
+from urdfkin.verify.pinocchio import pinocchio, version
+from urdfkin.verify.second_reader import SecondReading, second_reading
+from urdfkin.verify.verifier import NotVerifiedWarning
+
+#: As PyPI's project `pinocchio` has it: plugins for nose.
+IMPOSTOR = '__version__ = "0.1"\n'
+
+
+@pytest.fixture
+def impostor(tmp_path: Path) -> str:
+    """A folder that Python searches first, with the other project installed in it."""
+    (tmp_path / "pinocchio").mkdir()
+    (tmp_path / "pinocchio" / "__init__.py").write_text(IMPOSTOR)
+    about = tmp_path / "pinocchio-0.5.1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: pinocchio\nVersion: 0.5.1\n")
+    (about / "RECORD").write_text("pinocchio/__init__.py,,\npinocchio-0.5.1.dist-info/METADATA,,\n")
+    return str(tmp_path)
+
+
+def misled(where: str, *words: str) -> Done:
+    return process(*words, PYTHONPATH=where)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words", ["jacobian elbow --q random", "validate elbow --samples 1", "dh elbow", "--version"]
+)
+def test_another_project_of_that_name_is_named_with_what_cures_it(impostor: str, words: str) -> None:
+    done = misled(impostor, *words.split())
+    assert done.code == 2, "1 would mean a disagreement"
+    assert "pinocchio 0.5.1, another project" in done.err
+    assert "pip uninstall pinocchio; pip install 'pin>=4,<5'" in done.err
+    assert len(done.err.splitlines()) == 1
+    assert "Traceback" not in done.err
+    assert "4.1.0" not in done.text + done.err
+
+
+@pytest.mark.slow
+def test_without_a_check_nobody_asks_which_it_is(impostor: str) -> None:
+    done = misled(impostor, "placement", "elbow", "--no-verify")
+    assert done.code == 3
+    assert "NOT VERIFIED" in done.text
+
+
+@pytest.mark.slow
+def test_a_file_of_that_name_beside_ones_program_is_named(tmp_path: Path) -> None:
+    (tmp_path / "pinocchio.py").write_text("")
+    done = misled(str(tmp_path), "--version")
+    assert f"rename or remove {tmp_path / 'pinocchio.py'}" in done.err
+
+
+def module(**words: object) -> ModuleType:
+    made = ModuleType("pinocchio")
+    made.__dict__.update({"__file__": "/there/pinocchio/__init__.py"} | words)
+    return made
+
+
+def test_the_version_is_that_of_the_module_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pinocchio", module(buildModelFromXML=None, __version__="4.98.7"))
+    assert version() == "4.98.7"
+
+
+def test_an_older_pinocchio_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pinocchio", module(buildModelFromXML=None, __version__="3.9.0"))
+    with pytest.raises(InstallationError, match=r"needs Pinocchio 4 .*: found 3\.9\.0; pip install 'pin"):
+        pinocchio()
+    assert version() == "not installed"
+
+
+def test_without_any_the_package_to_install_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pinocchio", None)
+    robot = urdfkin.load("elbow")
+    with pytest.raises(InstallationError, match="pip install 'pin>=4,<5'"):
+        robot.placement(robot.neutral(), "tool")
+
+
+# -- muJoCo as the oracle: it reads the robot itself and computes the same, or states why it cannot ----------
+
+
+SUBJECTS: dict[str, tuple[str, dict[str, Any]]] = {
+    "an arm": (arm(axis='<axis xyz="1 2 -3"/>'), {}),
+    "a slide": (arm(attributes='type="prismatic"'), {}),
+    "a planar joint below a floating one": (
+        arm(attributes='type="floating"', axis="", limit="", second='type="planar"'),
+        {},
+    ),
+    "a follower": (arm(follow='<mimic joint="j1" multiplier="-2" offset="0.3"/>'), {}),
+    "a follower set free": (arm(follow='<mimic joint="j1" multiplier="-2"/>'), {"mimic": False}),
+    "names that MuJoCo takes": (
+        arm(base='<link name="base"/><link name="world"/>', more=fixed("l1", "tool", "world")),
+        {},
+    ),
+    "hung from a floating joint": (arm(), {"root_joint": "floating"}),
+    "hung from a planar joint": (arm(), {"root_joint": "planar"}),
+}
+
+
+def base_motion(rng: np.random.Generator, size: float) -> urdfkin.BaseMotion:
+    R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R * np.linalg.det(R), size * rng.normal(size=3)
+    return urdfkin.BaseMotion(T, *rng.normal(size=(2, 6)))
+
+
+def ask_everything(robot: urdfkin.Robot, n: int, base: urdfkin.BaseMotion | None) -> None:
+    rng = np.random.default_rng(1)
+    q, (v, a), frames = robot.sample(n), rng.normal(size=(2, n, robot.nv)), robot.all_frames
+    robot.placement(q, frames, base=base)
+    for reference in Reference:
+        robot.velocity(q, v, frames, reference, base=base)
+        robot.jacobian(q, frames, reference, base=base)
+        robot.jacobian_rate(q, v, frames, reference, base=base)
+        robot.acceleration(q, v, a, frames, reference, base=base)
+    robot.analytical_jacobian(q, frames[-1], "quaternion", base=base)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SUBJECTS)
+@pytest.mark.parametrize("far", [None, 1.0, 1e6], ids=lambda far: f"base {far}")
+def test_mujoco_agrees_in_every_quantity_and_reference(name: str, far: float | None) -> None:
+    text, options = SUBJECTS[name]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        robot = urdfkin.load(text, oracle="mujoco", **options)
+    ask_everything(robot, 5, None if far is None else base_motion(np.random.default_rng(0), far))
+    certificate = robot.certificate()
+    assert certificate.verified, certificate
+    assert certificate.oracle == f"MuJoCo {oracles.MUJOCO.version()}"
+    assert "checked by MuJoCo" in str(certificate)
+    assert all(line.worst < 40.0 for line in certificate.lines), certificate
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", catalogue())
+def test_mujoco_agrees_about_every_robot_of_the_catalogue(name: str) -> None:
+    robot = urdfkin.load(name, oracle="mujoco")
+    q = robot.sample(1)
+    v, a = np.random.default_rng(0).normal(size=(2, 1, robot.nv))
+    robot.jacobian_rate(q, v, robot.link_frames)
+    robot.acceleration(q, v, a, robot.link_frames)
+    assert robot.certificate().verified
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", robots.FAMILIES)
+def test_mujoco_agrees_about_odd_robots_or_says_why_not(family: str) -> None:
+    agreed = 0
+    for number in range(4):
+        case = robots.robot(7, family, number)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                robot = urdfkin.load(case.data, root_joint=case.root_joint, mimic=case.mimic, oracle="mujoco")
+            except urdfkin.UrdfError:
+                continue
+            ask_everything(robot, 2, None)
+        certificate = robot.certificate()
+        agreed += certificate.verified
+        reasons = " ".join(str(w.message) for w in caught if w.category is NotVerifiedWarning)
+        assert certificate.verified or "MuJoCo does not" in reasons, certificate
+    assert agreed
+
+
+def test_a_lever_that_is_nothing_is_nothing_to_mujoco() -> None:
+    """The rest of a robot, however large, has no part in a frame at the root."""
+    far = fixed("far", "l1", "end").replace("</joint>", '<origin xyz="1e60 0 0"/></joint>')
+    text = arm(origin='<origin rpy="0.1 0.2 0.3"/>', more=f'<link name="end"/>{far}')
+    with pytest.warns(urdfkin.UrdfWarning):
+        robot = urdfkin.load(text, oracle="mujoco")
+    J = robot.jacobian([0.3, 0.4], "link:l1")
+    assert (J[:3] == 0.0).all()
+    assert robot.certificate().verified
+
+
+def test_a_chain_that_is_too_deep_for_mujoco_is_not_handed_to_it() -> None:
+    links = "".join(f'<link name="l{i}"/>' for i in range(1_102))
+    joints = "".join(fixed(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(1_101))
+    text = f'<robot name="r">{links}{joints}</robot>'
+    robot = urdfkin.load(text, oracle="mujoco")
+    with pytest.warns(NotVerifiedWarning, match=r"chains of up to 1,000 links: found 1,101"):
+        robot.placement([], "l9")
+
+
+def test_what_pinocchio_refuses_mujoco_may_check() -> None:
+    with pytest.warns(urdfkin.UrdfWarning, match="URDF303"):
+        robot = urdfkin.load(arm(origin='<origin xyz="0\t0 1"/>'), oracle="mujoco")
+    robot.placement(robot.neutral(), "tool")
+    assert robot.certificate().verified
+
+
+@pytest.mark.parametrize(
+    ("method", "quantity"),
+    [("placements", "placement"), ("jacobians", "jacobian"), ("velocities", "velocity")],
+)
+def test_a_disagreement_with_mujoco_is_raised_in_its_name(
+    method: str, quantity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = getattr(MujocoOracle, method)
+    monkeypatch.setattr(MujocoOracle, method, lambda *given: right(*given) + 1e-9)
+    robot = urdfkin.load(arm(), oracle="mujoco")
+    inputs = (robot.neutral(),) if quantity != "velocity" else (robot.neutral(), [1.0, 1.0])
+    with pytest.raises(urdfkin.VerificationError, match="disagrees with MuJoCo's") as caught:
+        robot.compute(quantity, inputs, "tool")
+    assert "oracle" in str(caught.value), "the line that reproduces it asks MuJoCo again"
+
+
+def test_what_mujoco_does_not_know_is_a_reason() -> None:
+    text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
+    with pytest.warns(urdfkin.UrdfWarning):
+        robot = urdfkin.load(text, oracle="mujoco")
+    with pytest.warns(NotVerifiedWarning, match="MuJoCo does not know quat_xyzw"):
+        robot.placement(robot.neutral(), "tool")
+    assert not robot.certificate().verified
+
+
+def test_an_oracle_that_nobody_knows_is_an_error() -> None:
+    with pytest.raises(UnknownNameError, match=r"unknown oracle 'mujuco'.*did you mean mujoco"):
+        urdfkin.load(arm(), oracle="mujuco")  # type: ignore[arg-type]
+
+
+def test_an_oracle_that_is_not_installed_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("urdfkin.urdf.mujoco.installed_version", lambda _: None)
+    with pytest.raises(urdfkin.InputError, match=r"MuJoCo is not installed; pip install 'mujoco>=4,<5'"):
+        urdfkin.load(arm(), oracle="mujoco")
+
+
+# -- yourdfpy reads each URDF a second time, and a different tree is reported --------------------------------
+
+
+ARM = """<robot name="arm">
+<link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+  <origin xyz="0.1 0.2 0.3" rpy="0.1 -0.2 2.5"/><limit lower="-1" upper="2" effort="3" velocity="4"/></joint>
+<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/>
+  <limit lower="-1" upper="2" effort="3" velocity="4"/>
+  <mimic joint="turn" multiplier="0.5" offset="0.25"/></joint>
+<joint name="tool" type="fixed"><parent link="b"/><child link="c"/></joint>
+</robot>"""
+
+
+def quiet_load(source: str, **how: Any) -> urdfkin.Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        return urdfkin.load(source, verify=False, **how)
+
+
+def reading(text: str, **how: Any) -> SecondReading:
+    robot = quiet_load(text, **how)
+    added = robot.root_joint is not None
+    return second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic, root_joint=added)
+
+
+@pytest.mark.parametrize("name", ["panda", "talos", "elbow"])
+def test_both_readers_agree_on_the_catalogue(name: str) -> None:
+    robot = urdfkin.load(name, verify=False)
+    found = second_reading(robot.urdf, robot.tree)
+    assert (found.differences, found.known, found.unread) == ((), (), None)
+    assert found.joints == len(robot.tree.joints)
+
+
+@pytest.mark.slow
+def test_both_readers_agree_on_the_whole_catalogue() -> None:
+    for name in catalogue():
+        robot = quiet_load(name)
+        found = second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic)
+        assert (found.differences, found.unread) == ((), None), name
+
+
+@pytest.mark.parametrize("how", [{}, {"mimic": False}, {"root_joint": "floating"}])
+def test_options_of_load_are_no_difference(how: dict[str, Any]) -> None:
+    assert reading(ARM, **how).differences == ()
+
+
+def bend(joint: Any) -> None:
+    joint.axis = joint.axis + np.array([0.0, 1e-9, 0.0])
+
+
+def shift(joint: Any) -> None:
+    joint.origin = joint.origin.copy()
+    joint.origin[0, 3] += 1e-12
+
+
+def tilt(joint: Any) -> None:
+    joint.origin = joint.origin.copy()
+    joint.origin[0, 0] += 1e-14
+
+
+def widen(joint: Any) -> None:
+    joint.limit.upper = 2.5
+
+
+def hang(joint: Any) -> None:
+    joint.parent = "c"
+
+
+def rename(joint: Any) -> None:
+    joint.name = "other"
+
+
+def change_kind(joint: Any) -> None:
+    joint.type = "continuous"
+
+
+PLANTED: dict[str, tuple[Callable[[Any], None], str]] = {
+    "axis": (bend, "joint turn: axis"),
+    "origin": (shift, "joint turn: origin"),
+    "rotation": (tilt, "joint turn: rotation"),
+    "limit": (widen, "joint turn: limit"),
+    "parent": (hang, "joint turn: from c to a"),
+    "name": (rename, "joint turn: 0 times, not 1"),
+    "kind": (change_kind, "joint turn: type continuous, not revolute"),
+}
+
+
+def plant(monkeypatch: pytest.MonkeyPatch, fault: Callable[[Any], None], index: int = 0) -> None:
+    right = second_reader.read
+
+    def wrong(text: str) -> Any:
+        robot = right(text)
+        fault(robot.joints[index])
+        return robot
+
+    monkeypatch.setattr(second_reader, "read", wrong)
+
+
+@pytest.mark.parametrize("what", PLANTED)
+def test_a_planted_difference_is_reported(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    fault, words = PLANTED[what]
+    plant(monkeypatch, fault)
+    assert any(words in text for text in reading(ARM).differences)
+
+
+def test_a_different_mimic_rule_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    def double(joint: Any) -> None:
+        joint.mimic.multiplier *= 2.0
+
+    plant(monkeypatch, double, 1)
+    (difference,) = reading(ARM).differences
+    assert difference.startswith("joint slide: mimic rule")
+
+
+def test_a_bent_axis_fails_the_validation(monkeypatch: pytest.MonkeyPatch) -> None:
+    plant(monkeypatch, bend)
+    report = validate(ARM, samples=0)
+    (robot,) = report.robots
+    assert robot.verdict is Verdict.DISAGREES
+    assert "yourdfpy" in str(robot.reason)
+    assert "joint turn: axis" in str(robot.reason)
+    assert robot.failed == 0
+
+
+def test_known_faults_are_named_and_not_counted() -> None:
+    text = ARM.replace('axis xyz="0 0 1"', 'axis xyz="0 0 2"')
+    text = text.replace("<robot", '<robot version="1.2"').replace('rpy="0.1 -0.2 2.5"', 'quat_xyzw="0 0 1 1"')
+    found = reading(text)
+    assert found.differences == ()
+    assert found.known == ("does not normalise an axis: turn", "ignores quat_xyzw: turn")
+
+
+def test_a_file_that_yourdfpy_cannot_read_is_named_and_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(text: str) -> None:
+        raise KeyError("link")
+
+    monkeypatch.setattr(second_reader, "read", refuse)
+    report = validate(ARM, samples=0)
+    assert report.passed
+    assert report.as_dict()["robots"][0]["second_reader"]["unread"] == "KeyError: 'link'"  # type: ignore[index]
+
+
+def test_a_document_type_is_not_given_to_yourdfpy() -> None:
+    found = second_reading("<!DOCTYPE robot>" + ARM, quiet_load(ARM).tree)
+    assert found.unread == "the file has a document type"
+
+
+def test_the_declared_encoding_of_the_file_does_not_matter() -> None:
+    assert reading(ARM.replace("turn", "drehen_ä")).differences == ()
+    declared = '<?xml version="1.0" encoding="latin-1"?>' + ARM.replace("turn", "drehen_ä")
+    tree = quiet_load(ARM.replace("turn", "drehen_ä")).tree
+    assert second_reading(declared, tree).differences == ()
