@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from scipy.linalg import expm
 
-from tests.cli.test_dh import run_any
+from tests.cli.running import good
 from tests.random_chains import trees
 from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.screws import ProductOfExponentials, screws_from, screws_of
@@ -105,17 +105,12 @@ def test_a_wrong_screw_is_found_by_pinocchio() -> None:
 @pytest.mark.parametrize("form", ["toml", "json"])
 def test_a_written_file_is_a_robot(form: str, tmp_path: Path) -> None:
     path = tmp_path / f"arm.{form}"
-    assert (
-        run_any(
-            "screws", "ur5", "--base", "base", "--tip", "tool0", "--format", form, "-o", str(path)
-        ).exit_code
-        == 0
-    )
+    good("screws ur5 --base base --tip tool0 --format", form, "-o", str(path))
     robot, ur5 = load(path), load("ur5")
     q = np.linspace(-1, 1, 6)
     T = np.linalg.inv(ur5.placement(q, "base")) @ ur5.placement(q, "tool0")
     np.testing.assert_allclose(robot.placement(q, "tool0"), T, atol=1e-14)
-    shown = run_any("dh", str(path), "--snap", "1e-6", "--base", "base", "--tip", "tool0").stdout
+    shown = good("dh", str(path), "--snap", "1e-6", "--base", "base", "--tip", "tool0").text
     assert "q1" in shown
     assert "agrees within rounding" in shown
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.cli.test_dh import run_any
+from tests.cli.running import good
 from urdfkin.dh import DHTable, export, table_from_rows
 from urdfkin.dh.export.toolboxes import write_screws
 from urdfkin.dh.structure import opw_of, structure
@@ -81,10 +81,9 @@ def test_an_arm_of_another_kind_is_refused(name: str) -> None:
 
 @pytest.mark.slow
 def test_the_command_writes_what_the_solvers_read(tmp_path: Path) -> None:
-    result = run_any("structure", "kinova", "--opw", "0.001")
-    assert result.exit_code == 0
-    assert "is off by at most" in result.output
-    lines = dict(line.split(": ", 1) for line in result.stdout.splitlines() if line.startswith("opw_"))
+    result = good("structure kinova --opw 0.001")
+    assert "is off by at most" in result.text + result.err
+    lines = dict(line.split(": ", 1) for line in result.text.splitlines() if line.startswith("opw_"))
     assert sorted(lines) == [
         "opw_kinematics_geometric_parameters",
         "opw_kinematics_joint_offsets",

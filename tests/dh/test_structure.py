@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pytest
 
-from tests.cli.test_dh import run_any
+from tests.cli.running import good, urdfkin
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
 from urdfkin.dh import DHTable, table_from_rows, to_tree
@@ -111,11 +110,10 @@ def test_a_spherical_joints_centre_stays_where_pinocchio_puts_it(name: str) -> N
 
 
 def test_the_command_says_it_and_what_it_rests_on() -> None:
-    result = run_any("structure", "ur5", "--tip", "tool0")
-    assert result.exit_code == 0
-    assert "three parallel axes: shoulder_lift_joint, elbow_joint, wrist_1_joint, exactly" in result.stdout
-    assert "agrees within rounding" in result.stdout
-    data = json.loads(run_any("structure", "panda", "--format", "json").stdout)
+    result = good("structure ur5 --tip tool0")
+    assert "three parallel axes: shoulder_lift_joint, elbow_joint, wrist_1_joint, exactly" in result.text
+    assert "agrees within rounding" in result.text
+    data = good("structure panda --format json").data
     assert data["freedoms"] == 6
     assert data["joints"] == "RRRRRRR"
-    assert run_any("structure", "ur5", "--no-verify").exit_code == 3
+    assert urdfkin("structure ur5 --no-verify").code == 3
