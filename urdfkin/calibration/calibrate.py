@@ -55,21 +55,24 @@ from urdfkin.system.files import MOST_DATA, read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: Number of random configurations from which the parameters that are identifiable in principle are found.
+#: Number of random configurations for `Calibration.general`.
 _GENERAL = 40
-#: Largest difference between residual and stated noise without a warning, in standard deviations.
+#: If the residuals differ from the stated noise by more than this number of standard deviations, a warning is
+#: shown.
 _UNLIKELY = 4.0
 #: A parameter is poorly observable if its ratio of uncertainties (`Calibration.weak`) exceeds this number.
 _WEAK = 10.0
 #: Seed of the random configurations for `Calibration.weak`.
 #: The random configurations for `Calibration.general` have another seed.
 _OTHERS = 1
-#: Smallest diagonal entry of R, relative to the largest entry, of a column that counts as independent.
+#: Limit for the QR decomposition J = Q R of the Jacobian J. If a diagonal entry of R is at most this fraction
+#: of the largest entry of R, the columns of J are linearly dependent.
 _DEPENDENT = 1e-12
-#: x, y and z of a target that is on no joint axis: the robot's size divided by these numbers.
+#: Divisors of the robot's size. The quotients are the coordinates of a target that lies on no joint axis.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: `ParametricChain.rounding` is multiplied by this factor for the comparison with Pinocchio.
-#: Pinocchio has more rounding errors: it computes base and tip separately, and from rewritten origins.
+#: `ParametricChain.rounding` is multiplied by this factor for the comparison with Pinocchio. Pinocchio's
+#: result has more rounding errors. Pinocchio computes the poses of base and tip separately. It reads the
+#: origins from the written file.
 _READ_BACK = 4.0
 #: Number of parameters or poses that a warning names.
 _NAMED = 6
@@ -97,10 +100,10 @@ class Calibration:
             configurations.
         certificate: Pinocchio's check of the written model.
         stated: Whether the user stated the noise.
-        written_fit: The fit of only those parameters that are written; `fitted` if all parameters are
-            written.
+        written_fit: The fit of the written parameters. The other parameters have their original values. If
+            all parameters are written, `written_fit` is equal to `fitted`.
         significant: Indices of the parameters that `written_fit` fits.
-        plausibility: The objections to the fit; empty for a plausible fit.
+        plausibility: The reasons why the fit is refused; empty for a plausible fit.
     """
 
     robot: Robot
@@ -218,8 +221,8 @@ def calibrate(
 ) -> Calibration:
     """Fit the parameters of a robot or a table to measured poses.
 
-    The written model is loaded again, and its tip is compared with Pinocchio's at the measured
-    configurations.
+    urdfkin loads the written model again. It compares the tip's poses at the measured configurations with the
+    poses that Pinocchio computes.
 
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
@@ -339,7 +342,10 @@ def fitted_model(
 
 
 def _general_target(model: Model) -> FloatArray:
-    """Return the model's parameters (p,), with a fitted target in a position away from all joint axes."""
+    """Return the model's parameters (p,).
+
+    If the target is fitted, its position is away from all joint axes.
+    """
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -685,7 +691,7 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 
 
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
-    """Return measured poses with exact rotations, because their rotations may be rounded."""
+    """Replace each measured rotation by the nearest rotation matrix, because the input may be rounded."""
     R = T[:, :3, :3]
     bad = rotation_defect(R) > _WRITTEN
     if bad.any():

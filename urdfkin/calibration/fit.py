@@ -8,23 +8,26 @@ of the decomposition. You do not have to choose a tolerance.
 
 The frame of a revolute joint can be shifted along the joint's axis and rotated about it, if the next frame
 compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the joint's
-direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable, 2 of the 6 parameters of
-each prismatic joint, and all 6 parameters of the tip (Everett, Driels and Mooring, 1987). If only positions
-are measured, 3 fewer parameters are identifiable, because the tool's orientation is unknown.
+direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable. For each prismatic joint,
+2 of the 6 parameters are identifiable. All 6 parameters of the tip are identifiable (Everett, Driels and
+Mooring, 1987). If only positions are measured, 3 fewer parameters are identifiable, because the tool's
+orientation is unknown.
 
 The parameters that are not fitted are fixed. Orthogonal elimination chooses the fixed parameters joint by
-joint, from base to tip. Each parameter has a column in the Jacobian. In each step, the elimination finds the
-column that depends least on the kept columns. It then finds all columns that are nearly as independent. Of
-these columns, it keeps the first one in the model's order of preference. As a result, no fitted parameter
-becomes large to compensate for a fixed parameter. Without this choice, four parameters of nearly parallel
-axes would become hundreds of metres long and cancel each other.
+joint, from base to tip. Each parameter has a column in the Jacobian. In each step, the elimination subtracts
+from every other column its projection onto the kept columns. The length of the remainder measures how
+independent the column is. A column is a candidate if its remainder is at least half as long as the longest
+remainder. The elimination keeps the first candidate in the model's order of preference. As a result, no
+fitted parameter becomes large to compensate for a fixed parameter. Without this choice, four parameters of
+nearly parallel axes would become hundreds of metres long and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
-and r the weighted residuals. Then
+and r the weighted residuals. The covariance of the parameters is
 
-    C = (J^T J)^-1       is the covariance of the parameters,
-    H = J C J^T          is the hat matrix; 1 - H_ii is the redundancy of measurement i.
+    C = (J^T J)^-1.
+
+The hat matrix is H = J C J^T. The redundancy of measurement i is 1 - H_ii.
 
 Noise that you do not state is estimated from the residuals, separately for positions and rotations. The
 variance of the positions is the sum of their squared residuals divided by the sum of their redundancies. The
@@ -40,9 +43,9 @@ removes only the largest outlier and fits the other poses again. The steps end w
 measured poses M_i, the base B and the tool X, M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are linear in
 the two unknown rotations. Together these rotations form the null vector of the equations (Shah, 2013). The
 measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only
-positions are measured, the base and the position of the target on the tip are unknown. The base is a linear
-problem if the target is known, and the target is a linear problem if the base is known. The module therefore
-computes base and target alternately.
+positions are measured, the base and the position of the target on the tip are unknown. With a known target,
+the equations for the base are linear. With a known base, the equations for the target are linear. The module
+therefore computes base and target alternately.
 """
 
 from __future__ import annotations
@@ -63,10 +66,10 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: A column counts as independent enough if its remaining length is at least this fraction of the largest.
+#: The elimination may keep a column if its remainder is at least this fraction of the longest remainder.
 _AS_GOOD = 0.5
-#: Largest number of parameters with the same effect that the reason for a fixed parameter names.
-#: Each named parameter produces at least the fraction `_SHARE` of the fixed parameter's effect.
+#: The message about a fixed parameter names at most `_NAMED` fitted parameters with the same effect. A fitted
+#: parameter is named only if its effect is more than the fraction `_SHARE` of the fixed parameter's effect.
 _NAMED, _SHARE = 3, 1e-6
 
 
@@ -99,7 +102,7 @@ def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray 
         model: The model.
         values: (s, n) joint values.
         complete: Whether full poses are measured, not positions alone.
-        at: (p,) parameters; the model's own when None.
+        at: (p,) parameters at which the Jacobian is computed. None: the model's start values.
     """
     L = model.way.size
     _, columns = model.way.columns(values, at)
@@ -118,7 +121,7 @@ def identify(
         model: The model.
         values: (s, n) joint values.
         complete: Whether full poses are measured, not positions alone.
-        at: (p,) parameters at which identifiability is determined; the model's own when None.
+        at: (p,) parameters at which the Jacobian is computed. None: the model's start values.
     """
     J = stacked(model, values, complete=complete, at=at)
     error = np.full_like(J, model.way.rounding(values))
@@ -165,12 +168,13 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
     return f"same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
 
 
-#: A total redundancy below this number counts as no redundancy.
+#: If the sum of all redundancies is below this number, the fit cannot be checked.
 _ONE_OR_MORE = 0.5
-#: Smallest redundancy in one direction of a pose's error, relative to the pose's largest redundancy.
-#: The fit fully absorbs an error in a direction with a smaller redundancy.
+#: Smallest eigenvalue of the matrix 1 - H_ii that is not replaced by zero, relative to its largest
+#: eigenvalue. If a pose has an error along an eigenvector with a smaller eigenvalue, the residuals do not
+#: show this error.
 _FOLLOWED = 1e-9
-#: Largest number of noise estimates. The repetitions end at this relative change of the noise.
+#: Largest number of noise estimates. The estimation ends when the noise changes by at most this fraction.
 _ESTIMATES, _STAYS = 20, 1e-3
 #: Probability that an outlier is reported for a data set that has no outliers.
 WRONGLY = 0.01
@@ -398,7 +402,8 @@ def odd_poses(
 ) -> tuple[tuple[int, ...], Fit]:
     """Return the indices of the outliers, and the fit without them."""
     out = list[int]()
-    # More measured numbers than parameters must remain. At most a quarter of the poses may be outliers.
+    # Without the outliers, there must still be more measured numbers than parameters. At most a quarter of
+    # the poses may be outliers.
     most = min(int(_MOST_ODD * len(measured)), len(measured) - 1 - -(-len(kept) // found.errors.shape[1]))
     clean = found
     while len(out) < most:
@@ -456,8 +461,8 @@ def quantile(share: float, freedom: int) -> float:
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Largest number of repetitions in which base and target are computed alternately.
-#: The repetitions end at this relative change of the target.
+#: Largest number of repetitions in which base and target are computed alternately. The repetitions end when
+#: the position of the target changes by at most this fraction.
 _TURNS, _FIXED_END = 200, 1e-9
 #: Largest allowed spread of the measured positions, relative to the spread of the robot's tip positions.
 #: With positions in millimetres by mistake, this ratio is about 1000.
@@ -554,7 +559,8 @@ def demand_plausible(model: Model, measured: Measured) -> None:
     """Check that measured positions are in metres.
 
     Raises:
-        InputError: the positions spread more than 100 times as far as the robot's tip.
+        InputError: the spread of the measured positions is more than 100 times the spread of the robot's tip
+            positions.
     """
     T = model.way.poses(measured.values)
     ours, theirs = (

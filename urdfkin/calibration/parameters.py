@@ -2,18 +2,18 @@
 
 Compute the Jacobian with respect to the parameters.
 
-A model is a path (`urdfkin.model.path`), because a URDF's origins and the rows of a Denavit-Hartenberg table
-are products of constants and elementary motions. The amount of an elementary motion is a parameter or a
-joint's value. The gain g of a joint scales its value by (1 + g), so the column of g in the Jacobian is the
-joint's column times the joint's value.
+A model is a path (`urdfkin.model.path`). A path is a product of constant poses and elementary motions. The
+origins of a URDF and the rows of a Denavit-Hartenberg table are such products. The angle or length of an
+elementary motion is a parameter or a joint's value. The gain g of a joint scales its value by (1 + g), so the
+column of g in the Jacobian is the joint's column times the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
-to the joint's axis. The new origin is  T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore z
-shifts the origin along the joint's axis, and rz is the joint's zero, for every axis in the file. The other
-four parameters move the axis. The gain is a seventh parameter, which a URDF cannot store. `base` and `tool`
-have six parameters each. The path begins with the motions of `base`, which give the pose of the robot's base
-in the instrument's frame. The path ends with the motions of `tool`, which give the pose of the target in the
-tip's frame.
+to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, z
+always shifts the origin along the joint's axis, even if the file contains another axis than z. A change of rz
+changes the zero position of a revolute joint. The other four parameters move the axis. The gain is a seventh
+parameter, which a URDF cannot store. `base` and `tool` have six parameters each. The path begins with the
+motions of `base`, which give the pose of the robot's base in the instrument's frame. The path ends with the
+motions of `tool`, which give the pose of the target in the tip's frame.
 
 **Table.** The parameters of a row are its cells. If the row's axis is parallel to the next axis within
 `PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as the
@@ -151,9 +151,9 @@ class ParametricChain:
         return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
 
 
-#: Largest angle (rad) between two axes of a table that count as parallel.
-#: Parallel axes of a real arm deviate by some milliradians.
-#: The foot of their common normal is then far away: about a link's length divided by the angle.
+#: Largest angle (rad) between two axes of a table that count as parallel. Parallel axes of a real arm deviate
+#: by some milliradians. The common normal of such axes is far from the arm. Its distance is about a link's
+#: length divided by the angle.
 PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
@@ -294,10 +294,10 @@ class _Maker:
 
 
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> Model:
-    """Make the model of a URDF's path with the parameters to fit.
+    """Make a parametric model of a URDF's path.
 
-    The last fixed joint before the tip also has parameters. Other fixed joints have no parameters, because
-    parameters of the neighbouring moving joints have the same effect.
+    `fit` selects the sets of parameters. The last fixed joint before the tip also has parameters. Other fixed
+    joints have no parameters, because parameters of the neighbouring moving joints have the same effect.
 
     Raises:
         UnknownNameError: a frame or a set of parameters does not exist.

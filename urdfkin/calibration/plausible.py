@@ -30,9 +30,9 @@ from urdfkin.calibration.parameters import Model, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
-#: Limits of the rms position error as fractions of the reach. Above the first limit, a fit is refused.
-#: The second limit applies together with `_UNEXPLAINED`, the third limit together with `_HARDLY_BELOW`.
-#: Above the last limit, corrections of mistakes are tried.
+#: Limits of the rms position error, as fractions of the reach. A fit with an error above `_MISSED` is
+#: refused. `_CLOSE_BY` applies together with `_UNEXPLAINED`, and `_NO_BETTER` together with `_HARDLY_BELOW`.
+#: If the error is above `_SUSPECT`, urdfkin corrects each common mistake in the data and fits again.
 _MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
 #: Largest error of a fit, as a fraction of the spread of measured positions.
 #: A fit with a larger error is refused if the error also exceeds `_CLOSE_BY` times the reach.
@@ -40,8 +40,8 @@ _UNEXPLAINED = 0.25
 #: Largest error of a fit, as a fraction of the error before the fit.
 #: A fit with a larger error is refused if the error also exceeds `_NO_BETTER` times the reach.
 _HARDLY_BELOW = 0.7
-#: Limits of the rms orientation error, radians. Above the first limit, a fit is refused.
-#: Above the second limit, corrections of mistakes are tried.
+#: Limits of the rms orientation error, radians. A fit with an error above `_MISTURNED` is refused. If the
+#: error is above `_SUSPECT_TURN`, urdfkin corrects each common mistake in the data and fits again.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
 #: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
@@ -50,22 +50,22 @@ _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change before it is judged.
 #: The reason is that the tilt of an axis near the target is poorly observable.
 _UNCERTAIN = 5.0
-#: Largest error after a correction, as a fraction of the error before the correction.
-#: `_BETTER` is the limit if the fit is accepted, `_NOT_WORSE` if the fit is refused.
+#: Largest error after a correction, as a fraction of the error before the correction. `_BETTER` applies if
+#: the fit before the correction is accepted. `_NOT_WORSE` applies if that fit is refused.
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: Number of corrections that are fitted, beginning with the most promising corrections.
 #: The corrections also shift q by these numbers of rows, relative to the poses.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
-#: Number of joints that an objection names.
+#: Largest number of joints that a message names.
 _NAMED = 4
 
 
 @dataclass(frozen=True)
 class Plausibility:
-    """The objections to a fit.
+    """The reasons why a fit is refused.
 
     Attributes:
-        objections: Reasons why the fit is refused; empty for a plausible fit.
+        objections: A message for each reason; empty for a plausible fit.
         reason: The likeliest mistake and its remedy; None if no correction makes the fit plausible.
         is_in_degrees: Whether joint angles look like degrees. The fit is then returned only if `radians` is
             true.
@@ -158,7 +158,7 @@ def _reach(model: Model, ended: Ended) -> float:
 
 
 def _misfits(model: Model, ended: Ended) -> Iterator[str]:
-    """Yield objections to residuals that are too large."""
+    """Yield a message if position residuals or orientation residuals are too large."""
     reach = _reach(model, ended)
     (metres, turn), (metres_before, _) = ended.fitted.rms(), ended.before.rms()
     p = ended.measured.p
@@ -176,7 +176,7 @@ def _misfits(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
-    """Yield objections to fitted parameters that no real robot has."""
+    """Yield a message if fitted tilts or gains are larger than those of any real robot."""
     tilted, gained = dict[str, str](), dict[str, str]()
     for parameter, moved, surely in _changes(model, ended):
         if parameter.what in ("rx", "ry", "alpha", "beta") and surely > _TILTED:
@@ -243,7 +243,7 @@ def _out_of_range(model: Model, q: FloatArray) -> tuple[list[str], list[str]]:
 
 
 def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
-    """Yield each coordinate of the path as its name, whether it is an angle, and its two limits."""
+    """Yield (name, is_angle, lower limit, upper limit) for each coordinate of the path."""
     kinds = dict(zip(model.coupling.joints, model.coupling.kinds, strict=True))
     for name in model.coupling.names:
         lower, upper, kind = -math.inf, math.inf, kinds.get(name)
@@ -317,7 +317,8 @@ def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial
 def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
     """Try two or more reversed signs.
 
-    The search adds the best reversal as long as it reduces the error before the fit.
+    Each step reverses the joint whose reversal gives the smallest error. Only base and tool are fitted for
+    this error. The search ends when no reversal reduces the error.
     """
     names, signs = model.coupling.names, np.ones(ended.q.shape[1])
     best, least = None, math.inf

@@ -49,7 +49,8 @@ LINKS = {
 #: Lowercase letters are rotations about fixed axes, uppercase letters are rotations about moving axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of configurations for the fit of the origins; the check of the fit uses as many.
+#: Number of configurations for the fit of the origins. The check of the fit uses the same number of other
+#: configurations.
 _FITTED = 40
 #: Seeds of the random configurations for the fit of the origins, and for the check of this fit.
 _FITTED_SEED, _CHECKED_SEED = 2, 3
