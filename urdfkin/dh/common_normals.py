@@ -1,27 +1,28 @@
 """Compute the common normal of two consecutive joint axes, and handle axes without a unique common normal.
 
-`step_between` factors the constant pose A between two joint frames (z along each axis):
+The z axis of each joint frame points along the joint's axis. Let A be the constant pose of the next joint's
+frame in this joint's frame. `step_between` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-Rz(phi) Tz(delta) commutes with the motion of the first joint, so it becomes part of that joint's row.
-Rz(phi_next) Tz(delta_next) commutes with the motion of the second joint, so it becomes part of the second
-row. With beta = 0 and skew axes, the seven numbers are unique up to a half turn of the x axis (Denavit and
-Hartenberg). Then a is the distance between the two joint axes. The offset delta leads along the first axis,
-from the origin of its joint frame to the foot of the common normal. The offset delta_next leads along the
-second axis, from the other foot to the origin of that joint frame. Parallel axes have many common normals, so
-the feet are not unique. If the axes are nearly parallel, the feet are far away. docs/dh.md explains the
-choices for these two cases.
+The factors Rz(phi) and Tz(delta) commute with the motion of the first joint, so they belong to the first
+joint's row. The factors Rz(phi_next) and Tz(delta_next) commute with the motion of the second joint, so they
+belong to the second joint's row. For skew axes and beta = 0, the seven numbers are unique up to a half turn
+of the x axis (Denavit and Hartenberg). Then a is the distance between the two joint axes. The offset delta is
+measured along the first axis, from the origin of the first joint frame to the common normal. The offset
+delta_next is measured along the second axis, from the common normal to the origin of the second joint frame.
+Parallel axes have many common normals. The common normal of nearly parallel axes can be very far from the
+robot. docs/dh.md explains how urdfkin chooses the numbers in these two cases.
 
-`steps_like` makes all free choices as in another table: the feet that are not unique, the directions of x,
-and the offsets. Along several parallel axes, the pose of the tip determines only the sum of d. About several
-coinciding axes, it determines only the sum of theta. The rows of such axes get d or theta from the other
-table, except one row, which gets the remaining offset. In that row, the zero of the joint in the URDF
-determines d or theta; in the first row, the base can absorb it.
+`steps_like` chooses all numbers that are not unique as in another table. Such numbers are the offsets along
+parallel axes and the directions of the x axes. If several axes are parallel, the pose of the tip determines
+only the sum of their offsets d. If several axes coincide, the pose of the tip determines only the sum of
+their angles theta. For such axes, urdfkin copies d or theta from the other table, except in one row. In this
+row, d or theta makes the sum correct. If it is the first row, a change of the base can have the same effect.
 
-After a row between parallel axes, and after a Hayati row, the next row gets the remaining offset. A Hayati
-row ends in a plane normal to its axis, and the offset that the row gets shifts this plane. Therefore, the
-zero of a row's joint is computed before the rows that follow.
+Two parallel axes do not determine the offset d of their row. A Hayati row does not determine its d either. In
+both cases, the next row contains the rest of the offset. The x axis of a Hayati row lies in a plane normal to
+the joint's axis, and d shifts this plane. Therefore, urdfkin computes the d of a row before the later rows.
 
 **Noise.** Two correct programs read the same URDF and compute slightly different constant poses between two
 joint axes. The program that wrote the file may also have rounded each angle to fifteen digits.
@@ -31,9 +32,9 @@ eps from a multiple of a right angle, where eps is the machine epsilon. An angle
 digits differs by 900 eps or more and is not treated as round. The option `snap` replaces such an angle by the
 nearest multiple of 15 degrees and reports the effect.
 
-If the tilt between two axes is below the noise, the table contains zero instead of the tilt. The two axes
-then count as parallel, so that no foot is far away. `left_out` returns the sum of these tilts. The
-orientation error that these tilts cause is at most this sum.
+If the tilt between two axes is below the noise, urdfkin treats the two axes as parallel. The table then
+contains zero instead of the tilt. Otherwise, the common normal could be very far from the robot. `left_out`
+returns the sum of these tilts. The orientation error that these tilts cause is at most this sum.
 """
 
 from __future__ import annotations
@@ -51,11 +52,12 @@ from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUM
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Two axes with a smaller tilt (rad) are nearly parallel.
-#: The feet of their common normal have more than 100 times the errors of the URDF.
+#: Two axes with a smaller tilt (rad) are nearly parallel. If a number in the URDF has an error, the position
+#: of their common normal has more than 100 times this error.
 NEARLY_PARALLEL = 1e-2
 
-#: Largest tilt (rad) of nearly parallel axes whose common normal has a foot beyond the reach.
+#: Two axes with a larger tilt (rad) are never treated as nearly parallel. If the tilt is between
+#: `NEARLY_PARALLEL` and this number, the distance of the common normal decides.
 FAR_FEET = 0.35
 
 
@@ -68,10 +70,9 @@ class NearParallel(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The seven numbers of a step between two joint axes, in metres and radians.
+    """The seven numbers of the transform between two joint axes, in metres and radians.
 
-    The numbers are phi, delta, a, alpha, beta, phi_next and delta_next in the formula of the module's
-    docstring.
+    The module's docstring contains the formula with these numbers.
 
     Attributes:
         free: Whether `phi` was a free choice because the axes coincide.
@@ -119,13 +120,13 @@ def step_between(
 
     Args:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
-        reach: Length in metres. If a foot of the common normal is farther away than `reach`, the axes may get
-            a Hayati row.
+        reach: Length in metres. If the common normal is farther from a joint frame than `reach`, a Hayati row
+            is possible.
         near_parallel: Kind of row for nearly parallel axes.
         phi_free: Value of phi for coinciding axes, for which every phi is correct.
         delta_each: For parallel axes: True if `delta` contains the offset, False if `delta_next` contains it.
-        noise: Tilts and lengths below this noise become zero. None: the noise of the constant pose of one
-            joint.
+        noise: Tilts and lengths below this noise become zero. None: the noise of a pose that a single URDF
+            joint defines.
 
     Returns:
         The step.
@@ -146,9 +147,10 @@ def _is_near(feet: Step, sine: float, reach: float) -> bool:
 
 
 def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
-    """Return the step of two skew axes, with x along the cross product of z and z_next.
+    """Return the seven numbers for two skew axes.
 
-    The length a is positive, or 0 if the axes intersect.
+    The x axis points along the cross product of z and z_next. The length a is positive, or 0 if the axes
+    intersect.
     """
     phi = math.atan2(A[0, 2], -A[1, 2])
     along = math.cos(phi) * A[0, 3] + math.sin(phi) * A[1, 3]
@@ -163,8 +165,8 @@ def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
 def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_each: bool) -> Step:
     """Return the step between two parallel axes.
 
-    The x axis is along the perpendicular through the origin of this joint's frame. If the axes coincide,
-    every phi is correct, and phi is `phi_free`.
+    The x axis is along the perpendicular through the origin of this joint's frame. If the axes coincide, they
+    do not determine phi, and the function sets phi to `phi_free`.
     """
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
@@ -194,7 +196,7 @@ def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> S
 
 
 def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
-    """Return phi_next, the rotation about the next axis that remains after phi, alpha and beta.
+    """Return the angle phi_next (rad), computed from A and the angles phi, alpha and beta.
 
     The formula is accurate for every tilt.
     """
@@ -206,8 +208,9 @@ def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) ->
 def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
     """Return a length without rounding noise.
 
-    A length that differs from 0 only by rounding becomes 0. A length that differs from a number with twelve
-    digits only by rounding becomes this number. Any other length is returned unchanged.
+    If the length is 0 within rounding error, the function returns 0. If the length is a decimal number of
+    twelve digits within rounding error, the function returns this decimal number. Otherwise, it returns the
+    length unchanged.
 
     Args:
         length: Metres.
@@ -237,7 +240,7 @@ def cleaned_angle(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairLike:
-    """Two consecutive axes of a path, and the row of another table for the same two axes.
+    """Two consecutive joint axes of a path, with the corresponding row of another table.
 
     Attributes:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
@@ -260,9 +263,9 @@ class PairLike:
 
     @property
     def passes_on(self) -> bool:
-        """Whether the offset along the axis is a free choice, because the common normal has no unique foot.
+        """Whether the two axes do not determine the row's offset d.
 
-        The next row then gets the remaining offset.
+        The next row then contains the rest of the offset.
         """
         return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
 
@@ -270,7 +273,7 @@ class PairLike:
     def _gets_hayati_row(self) -> bool:
         """Whether the pair of axes gets a Hayati row.
 
-        If a row of four parameters is possible too, the pair gets the same kind of row as in the other table.
+        If a row of four parameters is possible too, the other table decides between the two kinds of rows.
         """
         sine = tilt_of(self.A)
         leans_there = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
@@ -285,15 +288,15 @@ class PairLike:
 
     @property
     def cut(self) -> float | None:
-        """Distance (metres) along the first axis, from its joint's frame to the plane of the Hayati row.
+        """Distance (metres) along the first axis from the joint's frame to the x axis of the Hayati row.
 
-        This plane is normal to the first axis. The Hayati row of the other table lies in the same plane.
+        This x axis lies in a plane normal to the first axis.
 
-        The next axis intersects the plane in a point, whose distance from the first axis is the a of the
-        other row. The component of this distance in the direction of the tilt determines the plane. The error
-        of the plane is then the rounding error divided by the tilt. For a slight tilt, the component normal
-        to that direction gives a more accurate plane. The result is None if the plane is farther away than
-        `reach`.
+        The next axis intersects the plane in a point. The distance of this point from the first axis is the
+        cell a in the other table. The component of this distance in the direction of the tilt determines the
+        position of the plane. The position error is then the rounding error divided by the tilt. For a slight
+        tilt, the component normal to the direction of the tilt gives a more accurate position. The result is
+        None if the plane is farther away than `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)
@@ -310,8 +313,8 @@ class PairLike:
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> Step:
         """Return the step between the two axes.
 
-        The DH frame is at the offset `carry` before the joint's frame. If the row's offset is a free choice,
-        it is `d`.
+        `carry` is the offset (metres) along the first axis from the DH frame to the joint's frame. `d` is the
+        row's offset, which is used only if the two axes do not determine it.
         """
         if not self.passes_on:
             return step_between(
@@ -325,14 +328,19 @@ class PairLike:
         return replace(step, delta=step.delta + d) if d else step
 
     def passed_back(self, carry: float) -> float:
-        """Return the offset (metres) before a row with d = 0 that gives the next row the offset `carry`."""
+        """Return the offset (metres) from the DH frame to this joint's frame, if d = 0.
+
+        `carry` is the corresponding offset of the next joint.
+        """
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
 def steps_like(
     pairs: Sequence[PairLike], phi_in: float, carry: float, tip: float | None
 ) -> tuple[list[Step], list[float]]:
-    """Compute the steps between the axes of a path so that all free choices agree with another table.
+    """Compute the transforms between consecutive axes of a path.
+
+    Numbers that are not unique are the same as in another table.
 
     Args:
         pairs: All pairs of consecutive axes.
@@ -361,10 +369,9 @@ def steps_like(
 
 
 def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
-    """Return d of a row whose common normal has no unique foot.
+    """Return d of a row whose two axes do not determine d.
 
-    The result is either the d of this row in the other table, or the d that gives the later rows their d in
-    the other table.
+    The result makes d equal in the two tables, either in this row or in a later row.
     """
     pair = pairs[i]
     if not pair.passes_on or not (pair.slides or (i == 0 and pair.row.d)):
@@ -393,7 +400,7 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
 def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: float) -> float:
     """Return phi for two coinciding axes, for which any value of phi is correct.
 
-    The result gives either this row, or the prismatic rows after it, the theta of the other table.
+    The result makes theta equal in the two tables, either in this row or in the prismatic rows after it.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].slides:
@@ -427,7 +434,7 @@ def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
 
 
 def near(theta: float, there: float) -> float:
-    """Return `theta` in (-pi, pi], or the angle `there` if the two angles are equal within rounding."""
+    """Return `theta` in (-pi, pi]. An angle within rounding error of `there` becomes `there`."""
     off = math.remainder(theta - there, 2.0 * math.pi)
     return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
 
@@ -497,7 +504,7 @@ def noise_of(joints: int, length: float, reach: float) -> Noise:
 
 
 def noises(chain: FrameChain, reach: float) -> list[Noise]:
-    """Return the noise of each constant pose of a chain."""
+    """Return the largest rounding errors of each constant pose of a chain."""
     return [
         noise_of(joints, float(length), reach)
         for joints, length in zip(chain.folded, chain.lengths, strict=True)
@@ -505,10 +512,9 @@ def noises(chain: FrameChain, reach: float) -> list[Noise]:
 
 
 def left_out(chain: FrameChain) -> float:
-    """Return the sum of all tilts of a chain that count as rounding (rad).
+    """Return the sum (rad) of those tilts between consecutive axes that are not larger than rounding errors.
 
-    The sum contains the tilt between each two consecutive z axes. It also contains tilts of x axes, such as
-    that of the tip.
+    The sum contains the tilts of z axes and of x axes.
     """
     found = 0.0
     for A, noise in zip(chain.constants, noises(chain, 0.0), strict=True):

@@ -11,10 +11,10 @@ Tx(a) Rx(alpha), it moves into these two cells. In the same way, a tool of this 
 standard row. Therefore, conversion to the other convention and back gives the original table.
 
 In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
-i, so the frame of joint i is frame i - 1. S_i X_i with the joint at zero leads to frame i: d_{i-1,i} = d_i
-z_{i-1} + a_i x_i (7.64). In a modified table z_i is the axis of joint i, so the frame of joint i is frame i,
-and X_{i-1} S_i leads to frame i. The motion of a table is computed on this tree, and `to_urdf` writes the
-tree as a URDF.
+i, so the frame of joint i is frame i - 1. The pose of frame i in frame i - 1 is S_i X_i. If the joint is at
+zero, its translation is d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). In a modified table z_i is the axis of
+joint i, so the frame of joint i is frame i. The pose of frame i in frame i - 1 is X_{i-1} S_i. The motion of
+a table is computed on this tree, and `to_urdf` writes the tree as a URDF.
 """
 
 from __future__ import annotations

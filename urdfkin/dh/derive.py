@@ -5,7 +5,7 @@ The derivation makes these choices; docs/dh.md gives the reasons:
 - Frame 0 is at the foot of the perpendicular from the base's origin to the first axis. x_0 is the projection
   of the base's x axis.
 - x_i is along the common normal. The direction of x_i is reversed if theta would exceed a right angle.
-- Between parallel axes d = 0. The first row after these axes gets the whole offset along them.
+- Between parallel axes d = 0. The row of the last parallel axis contains the whole offset along these axes.
 - The last row reaches the tip if four parameters suffice.
 - A prismatic axis is on the line through the joint's origin in the URDF, except for the first and the last
   joint.
@@ -55,14 +55,17 @@ class Last(StrEnum):
 
 
 class First(StrEnum):
-    """Part of the table with the transform from the base to the first joint: d_1 and theta_1, or the base."""
+    """Whether the cells d_1 and theta_1 or the pose `base` contain the transform to the first joint."""
 
     BASE = "base"
     JOINT = "joint"
 
 
 class Sign(StrEnum):
-    """Rule for the direction of x: theta within a right angle, a not negative, or alpha not negative."""
+    """Cell that determines the direction of x.
+
+    With THETA, |theta| is at most a right angle. With A or ALPHA, this cell is not negative.
+    """
 
     THETA = "theta"
     A = "a"
@@ -70,7 +73,7 @@ class Sign(StrEnum):
 
 
 class Slide(StrEnum):
-    """Line of a prismatic joint: the line in the URDF, or a line through a neighbouring joint's origin."""
+    """Position of a prismatic axis: at the joint's origin, or at the origin of a neighbouring joint."""
 
     DRAWN = "drawn"
     MINIMAL = "minimal"
@@ -146,9 +149,9 @@ def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> 
     Args:
         chain: The path.
         choices: The options.
-        like: A standard table of the same joints. The result has the same directions of x, the same zeros of
-            the first and the last joint, and the same offsets along parallel axes. These have priority over
-            `choices`.
+        like: A standard table of the same joints. The result has the same directions of x and the same
+            offsets along parallel axes. The zero positions of the first and the last joint are also the same.
+            These have priority over `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -190,7 +193,7 @@ def _table(
     steps: list[Step],
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
-    """Make the rows of the chosen convention from the factors S_1 X_1 S_2 X_2 ... S_n X_n."""
+    """Make the table in the chosen convention."""
     if choices.convention is Convention.MODIFIED and turns:
         first = as_step(ends[0])
         a, alpha = first or (0.0, 0.0)
@@ -240,9 +243,10 @@ def _use_freedom_of_prismatic_axes(
 
     A prismatic motion commutes with every translation, so a shift of the joint's line changes no placement.
     The first joint's line passes through the base's origin, so that the base can be the identity. The last
-    joint's line passes through the tip if the last row can then reach the tip. In a table without Hayati
-    rows, a line that is nearly parallel to a neighbouring joint's axis passes through that joint's origin.
-    Otherwise, the feet of the common normal would be far away.
+    joint's line passes through the tip if the table then needs no tool. In a table without Hayati rows,
+    urdfkin checks whether a prismatic axis is nearly parallel to the axis of a neighbouring joint. If it is,
+    the prismatic joint's line passes through the origin of the neighbouring joint. Otherwise, the common
+    normal would be far from the robot.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
@@ -268,7 +272,7 @@ def _use_freedom_of_prismatic_axes(
 
 
 def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> bool:
-    """Move joint k's line through the origin of a neighbouring revolute joint, so that a = 0.
+    """Shift joint k's line so that it contains the origin of a neighbouring revolute joint; then a = 0.
 
     If both neighbouring joints are revolute, the line passes through the origin of the next joint.
     """
@@ -294,16 +298,16 @@ def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) ->
 
 
 def _shift_after(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Move the whole offset before joint k to the pose after the joint.
+    """Shift the frame of joint k to the origin of the previous frame.
 
-    The components of `offset` are in the frame of joint k.
+    `offset` is the vector from the new origin to the old origin, with components in the frame of joint k.
     """
     constants[k][:3, 3] = 0.0
     constants[k + 1][:3, 3] += offset
 
 
 def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> None:
-    """Move `offset` (in joint k's frame) from the constant pose after joint k to the pose before joint k."""
+    """Shift the frame of joint k by `offset`, a vector with components in this frame."""
     constants[k][:3, 3] += constants[k][:3, :3] @ offset
     constants[k + 1][:3, 3] -= offset
 
@@ -344,7 +348,7 @@ def _steps(
     choices: Choices,
     noise: Sequence[Noise],
 ) -> tuple[list[Step], list[float]]:
-    """Return the steps between consecutive axes, and theta of each row; x is reversed where needed."""
+    """Return the transforms between consecutive axes, and theta of each row."""
     each = choices.parallel_offset is not ParallelOffset.LAST
     steps, thetas = list[Step](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -360,9 +364,9 @@ def _steps(
 
 
 def _offset_for_last_row(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
-    """Return the offset before the last row with which this row gets the d of the other table.
+    """Return the offset (metres) before the last row that makes d of the last row equal in the two tables.
 
-    The result is None if the row gets another d, for example because the other table has a tool.
+    The result is None if d cannot be equal, for example because the other table has a tool.
     """
     row = like.rows[-1]
     if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
@@ -377,7 +381,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Set theta of the first row to theta in another table; set d to 0 if the other table has d = 0.
+    """Copy theta of the first row from the other table; if d is 0 in the other table, copy d too.
 
     The remaining rotation and the remaining offset become part of the base.
     """
@@ -394,8 +398,8 @@ def _last_like(
 ) -> tuple[float, float, Step, FloatArray]:
     """Return the numbers of the last row, and the tool.
 
-    The row keeps its own numbers if neither table has a tool, and if theta is the same in the last rows of
-    both tables. Otherwise, the row gets the numbers of `like`, and the tool contains the difference.
+    If theta differs, or if one of the two tables has a tool, the function copies theta, a and alpha of the
+    other table. The tool then contains the difference. Otherwise, the numbers are unchanged.
     """
     row = like.rows[-1]
     as_there = _has_no_tool(like) and np.array_equal(tool, np.eye(4))
@@ -414,7 +418,8 @@ def _last_like(
 def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
     """Whether x must be reversed by the rule `sign`.
 
-    The rule "a" uses the sign of alpha if a is 0. The rule "alpha" uses the sign of a if alpha is 0 or pi.
+    The rule "a" makes a not negative. If a is 0, it makes alpha not negative. The rule "alpha" makes alpha
+    not negative. If alpha is 0 or pi, it makes the length a not negative.
     """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign is Sign.THETA or (not step.a and not by_alpha):

@@ -1,11 +1,11 @@
 """Make the Denavit-Hartenberg table of the path between two frames of a robot.
 
-You can request a table with the same frames as a published table. The author of a table chooses the sense of
-each joint and the direction of each x axis. `reversed_like` finds all patterns of senses that fit the
-published table approximately. It derives a table for each of these patterns, and selects the table that is
-closest to the published table. The cells of the tables have priority, followed by the zeros, and then base
-and tool. In the table of a Kinova arm, for example, the first joint has sense -1, and frame 0 is upright as
-in the data sheet.
+You can request a table with the same frames as a published table. The author of a table chooses the positive
+direction of each joint and the direction of each x axis. `reversed_like` finds all likely combinations of
+positive directions. It derives a table for each combination, and selects the table that is closest to the
+published table. The difference of the cells decides first. Among tables with equally close cells, the zero
+positions of the joints decide, and then base and tool. In the table of a Kinova arm, for example, the first
+joint has the opposite direction of the joint in the URDF. Frame 0 is upright as in the data sheet.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from urdfkin.errors import InputError, Question
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: Limits of differences, relative to the reach, or in rad.
-#: A table whose cells differ by more than `_ANOTHER` describes another robot.
-#: Joint zeros that differ by more than `_OTHER` count as different.
+#: Limits of differences, relative to the reach, or in rad. A table whose cells differ by more than `_ANOTHER`
+#: describes another robot. Two zero positions of a joint are different if their angles differ by more than
+#: `_OTHER`.
 _ANOTHER, _OTHER = 0.1, 1e-2
 #: Two cells with a smaller difference (relative to the reach, or in rad) count as equal.
 _ROUNDING = 1e-12
@@ -146,20 +146,21 @@ def dh_table(
             angle as it is in the file.
         last: "tip": the last row reaches the tip if four parameters suffice. "flange": the tool contains the
             transform from the last axis to the tip.
-        parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the first row
-            after these axes. "first": the row of the first of these axes. "each": every row contains the
+        parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the row of the
+            last of these axes. "first": the row of the first of these axes. "each": every row contains the
             offset of its own link.
-        flip: Names of joints to reverse; the rows of these joints have sense -1.
+        flip: Names of joints whose positive direction is reversed. The attribute `sense` of their rows is -1.
         first: "base": if possible, d_1 and theta_1 contain the transform from the base to the first axis.
             "joint": the base contains this transform, so that d_1 and theta_1 are zero (Craig's frame 0).
-        sign: Direction of x: "theta" keeps theta within a right angle; "a" and "alpha" make the cell of that
-            name not negative.
-        slide: Line of a prismatic joint, because a prismatic joint defines only a direction. The line "drawn"
-            passes through the joint's origin in the URDF. The line "minimal" passes through the origin of the
-            next revolute joint, so that a is 0.
-        like: A published table. The result has the same senses, directions of x, zeros of the first and last
-            joint, and offsets along parallel axes. The lengths, the angles, the base and the tool come from
-            the URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
+        sign: Rule for the direction of x. "theta": |theta| is at most a right angle. "a": the cell a is not
+            negative. "alpha": the cell alpha is not negative.
+        slide: Position of the axes of prismatic joints, which define only a direction. "drawn": the axis
+            passes through the joint's origin in the URDF. "minimal": the axis passes through the origin of
+            the next revolute joint, so that a is 0.
+        like: A published table. The result has the same positive directions of the joints, directions of x,
+            and offsets along parallel axes. The zero positions of the first and the last joint are also the
+            same. The lengths, the angles, the base and the tool come from the URDF. `flip`, `first`, `last`,
+            `sign` and `parallel_offset` are then ignored.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.

@@ -1,4 +1,4 @@
-"""Read tables from files: TOML and JSON, and text from a spreadsheet, README, paper or web page.
+"""Read tables from TOML files, JSON files, and plain text that you copy from a document or web page.
 
 `urdfkin.dh.rows` defines the content of TOML and JSON files.
 
@@ -38,11 +38,11 @@ from urdfkin.kinematics.rotation import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
-#: Largest deviation of a matrix printed with six digits from a rotation matrix.
-#: A matrix with a larger deviation is not corrected.
+#: Largest difference between a printed rotation matrix (six digits) and the nearest exact rotation matrix. A
+#: matrix with a larger difference is not corrected.
 _PRINTED = 1e-5
-#: Number of lines after the heading of a pose in which the three rows of the pose are searched.
-#: Some of these lines may be blank or Markdown fences.
+#: The three rows of a pose must be within this number of lines after the heading of the pose. Some of these
+#: lines may be blank or Markdown fences.
 _POSE_LINES = 6
 #: A setting on a separate line, such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
@@ -86,7 +86,8 @@ def from_sheet(text: str) -> dict[str, Any]:
     else:
         raise _no_header(lines)
     around = [spelled(line) for line in grid.around]
-    # A title is not a setting, even if the robot's name is "robot", which is also the name of a setting.
+    # The title contains the robot's name. A robot with the name "robot" would make the title look like the
+    # setting `robot`.
     plain = [line for line in grid.around if not _TITLE.search(line)]
     data = _settings(plain, _KEY if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(around, grid.columns)):
@@ -210,7 +211,7 @@ def _latex(lines: list[str]) -> _Grid | None:
 
 
 def _bars(lines: list[str]) -> _Grid | None:
-    """Parse columns between the bars of Markdown or the vertical lines of printed boxes."""
+    """Parse columns that are separated by the character | or by vertical box-drawing characters."""
     plain = [re.sub("[\u2502\u2503\u2551]", "|", line) for line in lines]
     plain = [re.sub(r"\\([\[\]()])", r"\1", line) for line in plain]  # Markdown's escapes: a \[m\]
 
@@ -411,7 +412,7 @@ def _nested(row: dict[str, Any]) -> dict[str, Any]:
 def _interpret_variables(data: dict[str, Any], named: list[str]) -> None:
     """Interpret the variables q1, q2, ... of the rows.
 
-    A row with the variable of another row is a mimic joint.
+    If a row contains the variable of another row, its joint mimics the joint of the other row.
     """
     rows = data["rows"]
     names = named or [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]

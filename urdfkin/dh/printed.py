@@ -55,7 +55,7 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     Args:
         table: The table.
         units: Format of the printed table.
-        pose_digits: Significant digits of base and tool; the digits of `units` when None.
+        pose_digits: Significant digits of base and tool. None: as many digits as in `units`.
     """
     digits = pose_digits or units.digits
     rows = tuple(_row(row, units) for row in table.rows)

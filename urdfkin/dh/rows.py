@@ -39,7 +39,7 @@ from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic
 
 
 class Literal(float):
-    """A number that also stores its text in the file."""
+    """A number with its original text."""
 
     text: str
 
@@ -74,7 +74,7 @@ def _of_row(row: Mapping[str, Any] | Sequence[Any], units: Units) -> dict[str, f
 
 
 def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
-    """Return half a unit of a number's last digit, in the unit of the number; 0 if the number is exact.
+    """Return half a unit of a written number's last digit; 0 if the number is exact.
 
     Example:
         >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
@@ -138,9 +138,9 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
 def refuse_other_order(rows: Sequence[Any]) -> None:
     """Reject rows, given as lists, that seem to be in the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles of a table are nearly always multiples of 15 degrees. Lengths hardly ever look like such angles.
-    Rows are rejected if all numbers in the first and fourth columns look like multiples of 15 degrees, and no
-    number in the second column does.
+    Angles of a table are nearly always multiples of 15 degrees. Lengths hardly ever look like such angles. In
+    the Robotics Toolbox's order, the first and the fourth column contain angles, and the second column
+    contains lengths. Rows are rejected if the numbers in these three columns look like this.
 
     Raises:
         InputError: the columns seem to be in the other order; the message names the two orders.
@@ -385,7 +385,8 @@ def table_from_rows(
         angles: "radians" or "degrees".
         lengths: "metres" or "millimetres".
         base: (4, 4) or (3, 4) T_base_0, with lengths in `lengths`; the identity when None.
-        tool: (4, 4) or (3, 4) T_n_tip, with lengths in `lengths`; the identity when None.
+        tool: (4, 4) or (3, 4) pose T_n_tip of the tip in frame n, with lengths in the unit `lengths`. None:
+            the identity.
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.

@@ -42,8 +42,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws.
-#: The length of an axis may differ from 1 by this much, and the pitch (m/rad) from 0.
+#: Tolerance of handwritten screws. The length of an axis may differ from 1 by at most this number. The pitch
+#: (m/rad) of a revolute joint's screw may differ from 0 by at most this number.
 _WRITTEN = 1e-4
 
 
@@ -185,7 +185,7 @@ class ProductOfExponentials(Displayable):
 
         The bound does not contain the effect of rounding in q.
 
-        Each exponential counts as two rows of a Denavit-Hartenberg table.
+        It is twice the bound for a Denavit-Hartenberg table of the same path.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")

@@ -136,8 +136,8 @@ def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
 def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree, dict[str, float]]:
     """Snap roll, pitch and yaw of all joint origins.
 
-    The function returns the tree with snapped origins. For each changed joint it also returns the angle (rad)
-    by which the origin rotated.
+    The function returns the tree with the changed joint origins. For each changed joint it also returns the
+    angle (rad) by which the origin rotated.
     """
     joints, moved = list(tree.joints), dict[str, float]()
     for i, joint in enumerate(joints):
@@ -253,11 +253,11 @@ def travel(limit: Limit | None) -> float:
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
-#: A cell nearly equals a round value if it differs from this value by at most this number.
-#: For an angle, the round values are the multiples of 15 degrees, and the difference is in radians.
-#: For a length, the round value is 0, and the difference is divided by the table's span.
+#: A cell nearly equals a round value if it differs from this value by at most this number. For an angle, the
+#: round values are the multiples of 15 degrees, and the difference is in radians. For a length, the only
+#: round value is 0, and the length is divided by the table's span.
 LARGEST = 1e-4
-#: Tolerances for snapping that the hint tries, in radians, in ascending order.
+#: Tolerances (rad) that `snap_hint` tries, in ascending order.
 TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
@@ -279,16 +279,18 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Return a line of text with a cell that nearly equals a round value, and a tolerance for snapping.
+    """Return a hint about cells that nearly equal a multiple of 15 degrees or zero.
 
-    The tolerance is the one in `TOLERANCES` that snaps the most cells of this kind.
+    The hint names one of these cells. It also recommends the tolerance in `TOLERANCES` with which the fewest
+    such cells remain.
 
     Args:
         table: An exact table.
-        snapped: Function that returns the same table, snapped with a tolerance (rad).
+        snapped: Function that takes a tolerance (rad), and returns the same table with angles rounded to
+            multiples of 15 degrees.
 
     Returns:
-        The line of text. None if there is no such cell, or if no tolerance snaps such a cell.
+        One line of text. None if there is no such cell, or if no tolerance reduces the number of such cells.
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:

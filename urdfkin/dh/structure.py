@@ -12,11 +12,11 @@ al., 2014). An OPW arm is the standard table
 
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
-with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF with the frames, zeros and
-senses of the OPW table (`urdfkin.dh.make`). The OPW parameters are read from the derived table. OPW has no
-parameter for the small tilts of a calibrated arm, so `opw_of` ignores these tilts. `Opw.placement` computes
-the solver's forward kinematics with the OPW parameters. The difference from the arm's placement is the error
-of the OPW parameters.
+with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF (`urdfkin.dh.make`). The
+frames, the zero positions and the positive directions of the joints are the same as in the OPW table. The OPW
+parameters are read from the derived table. OPW has no parameter for the small tilts of a calibrated arm, so
+`opw_of` ignores these tilts. `Opw.placement` computes the solver's forward kinematics with the OPW
+parameters. The difference from the arm's placement is the error of the OPW parameters.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
@@ -77,8 +77,8 @@ class Kind:
     Attributes:
         name: "parallel", "meet in a point", "spherical wrist", ...
         joints: Names of the joints.
-        radians: Angular deviation from the exact property.
-        metres: Linear deviation from the exact property.
+        radians: Angle (rad) between the actual axes and axes with the exact property.
+        metres: Distance (metres) between the actual axes and axes with the exact property.
         at: (3,) position of the intersection in the base at the zero configuration (metres), or None.
     """
 
@@ -305,7 +305,8 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
 
 
-#: Default tolerance of the tip error that OPW parameters cause (metres, rad), and number of samples.
+#: `TOLERANCE` is the default tolerance of `opw_of` (metres and rad). `SAMPLES` is the number of
+#: configurations at which `opw_of` computes the tip error.
 TOLERANCE, SAMPLES = 1e-6, 200
 _H = math.pi / 2.0
 _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
@@ -372,7 +373,8 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
         tolerance: Largest error of the tip on `SAMPLES` configurations, in metres and in radians.
 
     Raises:
-        InputError: the path has other joints, or is not an OPW arm. The message contains the tip error.
+        InputError: the path does not have exactly six revolute joints, or is not an OPW arm. The message
+            contains the tip error.
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
@@ -406,7 +408,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
 
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield an OPW table for each sign pattern of a1, a2 and b, with the approximate lengths of the arm."""
+    """Yield OPW tables with the approximate lengths of the arm, for all signs of a1, a2 and b."""
     rows = derive(path, Choices(last=Last.FLANGE)).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
@@ -422,9 +424,10 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _read(table: DHTable) -> Opw:
-    """Return the OPW parameters of a table with the frames of an OPW table.
+    """Return the OPW parameters of an arm.
 
-    The table's other numbers are ignored.
+    The input is a table of the arm that has the frames of the OPW table. Cells without a corresponding OPW
+    parameter are ignored.
     """
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
@@ -452,7 +455,7 @@ def _points(screws: ProductOfExponentials) -> FloatArray:
     """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
 
     If an axis has several intersections, the intersection of three axes has priority over the intersection of
-    two axes. The wrist has priority over the shoulder.
+    two axes. Of several intersections of three axes, the intersection closest to the tip has priority.
     """
     points, taken, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

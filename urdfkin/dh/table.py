@@ -498,8 +498,8 @@ class DHTable(Displayable):
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
         """Return bounds (...,), in m and rad, of the difference between the table's placement and the URDF's.
 
-        For an exact table these are the bounds of rounding errors. For a snapped table the bounds of the
-        effect of snapping are added.
+        For an exact table these are the bounds of rounding errors. If angles of the table were snapped to
+        multiples of 15 degrees, the bounds include the effect of these changes.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -543,7 +543,7 @@ class DHTable(Displayable):
 
         In a modified table the constant pose of a row comes before the row's motion. The motion of a revolute
         joint is a rotation by theta. The motion of a prismatic joint is a translation by d. The constant pose
-        contains the row's other cells.
+        of a row is the product of the transforms of its other cells.
         """
         steps: list[FloatArray | Motion] = [self.base]
         for row in self.rows:

@@ -2,8 +2,8 @@
 
 W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
 link j has one frame. The axis z_j of this frame is along the axis of the link's own joint (proximal, as in
-the modified convention). The antecedent i = a(j) of link j is the nearest moving link towards the root. The
-pose of frame j in the antecedent's frame is
+the modified convention). The nearest moving link towards the root is the antecedent of link j; i = a(j) is
+its index. The pose of frame j in frame i is
 
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
@@ -99,8 +99,9 @@ class TreeParameters:
             offsets.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row. The frame of
             a row has z along the joint's axis and x along the common normal.
-        left_out: Largest sum, over all paths, of the tilts that count as rounding (rad;
-            `urdfkin.dh.common_normals`).
+        left_out: Tilts that are not larger than rounding errors are replaced by zero
+            (`urdfkin.dh.common_normals`). This attribute is the sum (rad) of these tilts on the path with the
+            largest sum.
     """
 
     robot: str
@@ -225,7 +226,8 @@ class _Link:
         T_antecedent_axis: (4, 4) pose of the axis frame in the antecedent's axis frame.
         T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
         noise: Noise of `T_antecedent_axis`.
-        left_out: Sum (rad) of the tilts from the root to this link that are replaced by zero, as rounding.
+        left_out: Tilts that are not larger than rounding errors are replaced by zero. This attribute is the
+            sum (rad) of these tilts from the root to this link.
     """
 
     antecedent: int
@@ -238,8 +240,9 @@ class _Link:
 def _links(tree: KinematicTree) -> list[_Link]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_Link]()
-    # For each link, the row of the nearest moving link towards the root (-1: the root itself).
-    # Then the pose of the link in that moving link's axis frame, and the number of joints between them.
+    # The list has a tuple for each link. The first entry is the index of the nearest moving link towards the
+    # root, or -1 for the root. The second entry is the pose of the link in the axis frame of this moving
+    # link. The third entry is the number of joints between the two links.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, way) in enumerate(zip(tree.joints, _path_lengths(tree), strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -254,7 +257,10 @@ def _links(tree: KinematicTree) -> list[_Link]:
 
 
 def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
-    """Return the step to each axis, and the angle and the offset between each axis frame and its row's frame.
+    """Return a transform for each joint, and an angle and an offset for each moving link.
+
+    The transform is that from the antecedent's axis to the joint's axis. The angle and the offset describe
+    the frame of a row relative to the axis frame of its link.
 
     The first moving child of a link defines the link's x axis. For a link without a moving child, x is chosen
     so that theta = 0.

@@ -2,8 +2,8 @@
 
 `max_tip_error_bound` proves a bound of the tip error for every configuration, by the method of `urdfkin
 same`. The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches
-the joints of the two mechanisms without a fit. Then it bounds the effect of all differences on the tip with
-support functions, joint by joint from tip to base.
+the joints of the two mechanisms without a fit. It then computes an upper bound of the tip error that the
+differences cause. The computation uses support functions and goes from joint to joint, from tip to base.
 """
 
 from __future__ import annotations
@@ -44,18 +44,19 @@ TOLERANCE = 2e-4
 #: Number of configurations for a fit, and number of other configurations for the check of the fit.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Changes of cells explain the tip error if at most this fraction of the error remains.
+#: Differing cells are reported if their correction reduces the tip error to at most this fraction.
 _EXPLAINS = 0.5
 #: Largest fraction of the tip error that may remain after the correction of a single mistake.
 _LEFT = 0.05
 #: Smallest change of a cell that is reported, relative to the reach. It is a tenth of `EXPLAINED`.
 _MOVED = 1e-10
-#: A tip that moves by less than this fraction of the path length counts as fixed.
-#: The motion of a fixed tip does not determine the reach.
+#: A tip that moves by less than this fraction of the path length counts as fixed. For such a tip, the reach
+#: is the length of the path.
 _FIXED_TIP = 1e-6
 #: Range in which a prismatic joint without limits is sampled (metres).
 _SLIDE = (-0.5, 0.5)
-#: For each row of a table: half a unit of each cell's last digit in the file (metres and radians).
+#: For each row of a table: the rounding error of each cell (metres or radians). The rounding error is half a
+#: unit of the last digit in the file.
 Digits = Sequence[Mapping[str, float]]
 
 
@@ -74,8 +75,8 @@ def compare(
             are fixed to the same links.
         reference: The table in either convention, with a row for each moving joint in the path's order.
         tolerance: Tolerance at the tip (metres).
-        fit: Whether to fit base, tool, and the zeros and senses of the joints. If False, the table is
-            compared as it is written.
+        fit: Whether to fit base, tool, joint offsets and joint signs. If False, the table is compared as it
+            is written.
         digits: Precision of each cell in the table's file (`urdfkin.dh.rows.last_digits`).
 
     Returns:
@@ -128,8 +129,8 @@ def compare(
 def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
     """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
 
-    To be fast, the fit tries only a few patterns of joint senses and x directions. It does not try opposite
-    rotations about nearly coinciding axes.
+    To be fast, the fit tries only a few combinations of joint signs and directions of x. If two axes nearly
+    coincide, it does not try to rotate their joint offsets in opposite directions.
 
     Args:
         chain: The path.
@@ -224,7 +225,9 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 
 
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
-    """Return the index of the row of the reference table with a cell of row i of the standard table.
+    """Return the index of the row that contains a cell in the reference table.
+
+    In a standard table, row i contains this cell.
 
     A modified table contains a, alpha and beta of row i in row i + 1. The result is the number of rows if no
     row contains the cell.
@@ -325,8 +328,8 @@ def max_tip_error_bound(
 
     Args:
         path: The path; its mimic rules are ignored.
-        table: The table, with the path's joint values as variables. Senses and zeros of the joints are in its
-            rows.
+        table: The table, with the path's joint values as variables. The table's rows contain the joint signs
+            and joint offsets.
         slides: Ranges of the prismatic joints (metres).
     """
     mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))

@@ -2,23 +2,25 @@
 
 The tip's error at each sampled configuration is a twist. A small change of any number in the table also moves
 the tip by a twist: a rotation about a line or a translation along a line. The Gauss-Newton method finds the
-changes that remove the error. Base, tool and joint offsets are the free parameters. The free parameters are
-fitted first and absorb as much error as possible. Changes of cells absorb the remaining error. Sometimes
-several cells can absorb the same error, for example offsets along parallel axes. A reweighted least-norm
-solution then changes as few cells as possible.
+changes that remove the error. Base, tool and joint offsets are the free parameters. urdfkin first fits the
+free parameters. It then changes cells of the table to remove the remaining error. Sometimes different cells
+can remove the same error, for example offsets along parallel axes. A reweighted least-norm solution then
+changes as few cells as possible.
 
 **Free parameters.** `fit_freedoms` fits base, tool and joint offsets, with the cells unchanged. The method is
 damped least squares (`urdfkin.kinematics.least_squares`) on the tip's twists. Two joints with nearly
 coinciding axes have nearly the same effect. Let one offset increase by an angle, and let the other decrease
 by this angle. The tip then moves by at most the angle times the distance of the two axes. Such changes
 therefore change the error only slowly. To make long steps possible, the damping decreases while steps
-succeed. At the end of a descent, the fit starts again with opposite rotations of such pairs of offsets.
+succeed. When the error no longer decreases, urdfkin adds a large angle to one offset of such a pair, and
+subtracts it from the other offset. Then it fits again.
 
-**Signs.** `align` finds the senses and the directions of x with which a reference table fits the URDF. The
-author of a table has three choices that do not change the robot: the sense of a joint, the direction of x
-along a common normal, and the zero of theta. Each sense and each direction of x is represented by a sign.
-These signs determine the zeros of theta. A beam search extends sign patterns joint by joint. The search keeps
-the patterns whose cells are closest to the cells of the reference table.
+**Signs.** `align` finds the joint signs and the directions of x with which a reference table fits the URDF.
+The author of a table has three choices that do not change the robot: the positive direction of a joint, the
+direction of x along a common normal, and the zero position of theta. The signs +1 and -1 represent the two
+possible directions. All signs together determine the zero positions of theta. Each combination of signs gives
+a table for the URDF. A beam search chooses the signs joint by joint. At each joint, it keeps the combinations
+whose tables are closest to the reference table.
 """
 
 from __future__ import annotations
@@ -45,21 +47,23 @@ CELLS = ("theta", "d", "a", "alpha", "beta")
 _ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
 #: Largest step of the fit, in radians for angles, and in metres per metre of reach for lengths.
 LONGEST_STEP = 0.5
-#: Limits of the fit of cells: number of steps, relative improvement, and mean error that counts as zero.
+#: The fit of the cells ends after `_ROUNDS` steps. A step is an improvement if it reduces the error by more
+#: than the fraction `_BETTER`. A mean error of at most `_SOLVED`, relative to the reach, is treated as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
 #: A singular value counts as zero below this fraction of the largest singular value.
 #: `_FREE` applies to free parameters, `_CELLS` to cells.
 _FREE, _CELLS = 1e-8, 1e-9
-#: Number of iterations that reweight the cells, and the smallest weight of a cell relative to the reach.
+#: Number of iterations; each iteration computes new weights of the cells. The smallest weight is the fraction
+#: `_STAYS` of the reach.
 _SPARSER, _STAYS = 25, 1e-9
-#: Weight of the last cell relative to the first cell.
-#: With different weights, the solution changes only one of two cells that have the same effect.
+#: Weight of the last cell relative to the first cell. If two cells have the same effect, their weights
+#: differ. The solution then changes only one of the two cells.
 _LAST_WINS = 1.2
 #: Initial weight of beta, and the factor by which each iteration multiplies this weight.
 #: With a small weight, beta changes only if a change of alpha is not enough.
 _BETA, _BETA_AGAIN = 0.3, 0.5
-#: Free parameters can compensate for changes of some cells.
-#: If they compensate for all but this fraction of a cell's effect, the cell cannot be determined.
+#: A cell cannot be determined if a change of free parameters has the same effect on the tip. The two effects
+#: are treated as equal if they differ by at most this fraction.
 _HIDDEN = 1e-6
 
 
@@ -104,9 +108,9 @@ class Model:
         return _ROW * len(self.cells)
 
     def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path from base to tip, and the values (s, 5 n) of its motions at joint values (s, n).
+        """Return the path from base to tip, and an array (s, 5 n) with the angles and lengths of its motions.
 
-        Each cell of the table is one motion.
+        `values` (s, n) contains the joint values of s samples. Each cell of the table is one motion.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i in range(len(self.cells)):
@@ -151,9 +155,10 @@ class TargetPoses:
 def columns(
     model: Model, wanted: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, and the twists (6 s, columns) for changes of free parameters and of cells.
+    """Return the tip's poses, the twists of the free parameters, and the twists of the cells.
 
-    A twist is the derivative of the tip's poses with respect to a parameter.
+    Each array of twists has six rows for each sample, and a column for each number. A column is the
+    derivative of the tip's poses with respect to this number.
 
     The free parameters are six numbers of the base, six of the tool, and the variable of each row. The cells
     are in row order: five cells of row 1, five cells of row 2, and so on. Angles are multiplied by the scale.
@@ -249,7 +254,7 @@ def _span(freedoms: FloatArray) -> FloatArray:
 def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
     """Return (row, cell index) of the cells whose change has the same effect as a change of free parameters.
 
-    The free parameters compensate for all but 1e-6 of the effect of such a cell.
+    The two effects on the tip differ by at most the fraction 1e-6.
     """
     _, freedoms, cells = columns(model, wanted)
     Q = _span(freedoms)
@@ -281,17 +286,17 @@ def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])
 
 
-#: A descent ends after this number of steps with little improvement.
+#: The fit of the free parameters ends after this number of slow steps.
 _PATIENCE = 4
 #: A fit ends at this mean error, relative to the reach.
 _ROUNDING = 1e-13
-#: For a fast fit: number of sign patterns that are fitted, and number of patterns kept at each joint.
+#: Arguments `count` and `beam` of `align` for a fast fit.
 HASTY = (3, 16)
 #: Tip error that counts as rounding, relative to the reach. The search ends when the error is this small.
 _AT_ROUNDING = 1e-12
-#: Another sign pattern replaces the written one only if the tip error decreases to less than this fraction.
+#: Other joint signs than in the file are used only if they reduce the tip error to less than this fraction.
 _TWICE_AS_GOOD = 0.5
-#: Angles (rad) that are tried as opposite changes of two consecutive joint offsets.
+#: Angles (rad) that the fit adds to a joint offset and subtracts from the next joint offset.
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
@@ -315,9 +320,10 @@ def fitted_model(
     *,
     hasty: bool = False,
 ) -> Model:
-    """Return the best of several fits, which start from the written table and from likely sign patterns.
+    """Return the best of several fits.
 
-    The signs of the written table have priority: another pattern is used only if it halves the error.
+    The fits start from the written table, and from tables with other joint signs. Other joint signs are used
+    only if they halve the error.
     """
 
     def size(model: Model) -> float:
@@ -358,14 +364,14 @@ def ends_gathered(model: Model, written: Model) -> Model:
 
 
 def starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -> Iterator[Model]:
-    """Yield the models from which fits start: the table as it is written, then each likely sign pattern."""
+    """Yield the table as it is written, then the table with each likely combination of joint signs."""
     yield written
     for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         yield _start(standard, aligned)
 
 
 def _start(standard: DHTable, aligned: Alignment) -> Model:
-    """Return the reference table with the senses, offsets, base and tool of an alignment."""
+    """Return the reference table with the joint signs, joint offsets, base and tool of an alignment."""
     start = replace(
         as_written(standard),
         senses=np.array(aligned.senses, dtype=np.float64),
@@ -383,7 +389,7 @@ def fit_freedoms(model: Model, wanted: TargetPoses, *, turns: bool, ends: bool =
     Args:
         model: The start.
         wanted: Target poses from the URDF.
-        turns: Whether to try opposite rotations of two consecutive offsets at the end of a descent.
+        turns: Whether to call `_opposite_rotations` when the error no longer decreases.
         ends: Whether to fit only base and tool.
     """
     for _ in range(2 * len(model.cells)):
@@ -436,17 +442,19 @@ def _opposite_rotations(model: Model) -> list[Model]:
     return found
 
 
-#: Number of sign patterns that `align` returns, and number of patterns that it keeps at each joint.
+#: Number of sign combinations that `align` returns, and number of sign combinations that it keeps at each
+#: joint.
 PATTERNS, BEAM = 12, 128
-#: Cost (metres) of each joint sense that differs from the URDF's sense.
-#: Among equally good patterns, the search therefore selects the joint senses of the URDF.
+#: Number (metres) that the search adds to the cost of a combination for each reversed joint. Among equally
+#: good combinations, the search therefore selects the joint signs of the URDF.
 REVERSAL = 1e-9
-#: Weight of a cell's difference next to a prismatic axis, which can be shifted freely.
-#: Such a difference decides only between otherwise equal patterns.
+#: A prismatic axis can be shifted freely. Differences of lengths next to such an axis are therefore
+#: multiplied by this small weight.
 _SLIDING = 1e-3
 #: Parallel axes with a smaller distance (metres) count as coinciding. The direction of x is then free.
 _NO_OFFSET = 1e-5
-#: Patterns are equal if their numbers (metres, radians) agree after rounding to this number of decimals.
+#: Two candidates are equal if their numbers (metres, radians) agree after rounding to this number of
+#: decimals.
 _ALIKE = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -454,7 +462,7 @@ _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """A pattern of joint senses, with the joint offsets, the base and the tool that belong to it.
+    """A combination of joint signs, with the joint offsets, the base and the tool that belong to these signs.
 
     Attributes:
         senses: +1 or -1 for each joint. With -1, the reference's variable decreases if the URDF's joint value
@@ -479,14 +487,15 @@ class _Partial:
 
     Attributes:
         cost: Sum of the differences of the cells up to this joint (metres).
-        senses: Senses of all joints up to this joint.
+        senses: Sign (+1 or -1) of each joint up to this joint.
         offsets: Offsets of all joints before this joint.
         phi_in: Rotation from this joint's DH frame to its URDF frame (rad).
         carry: Offset from this joint's DH frame to its URDF frame (metres).
-        base: (4, 4) part of the base that comes from the first row's offset.
-        absorber: A row with a free offset, and the sign with which this offset rotates x. There is such a row
-            if the axes before the joint coincide, because only the sum of their joint angles is defined. The
-            offset of row 0 is in the base.
+        base: (4, 4) change of the base that replaces the offset of the first row.
+        absorber: Index of a row whose joint offset can have any value, and a sign. There is such a row if the
+            axes before the joint coincide, because only the sum of their joint angles is defined. The sign is
+            the direction in which this joint offset rotates x. For index 0, the base contains the joint
+            offset.
     """
 
     cost: float
@@ -499,10 +508,11 @@ class _Partial:
 
 
 def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[Alignment]:
-    """Return the sign patterns closest to a standard reference table with the same kinds of joints.
+    """Return the joint signs with which the table of a path is closest to a reference table.
 
-    With prismatic joints, several patterns may have equal cells. Only a fit can distinguish these patterns,
-    so up to `count` patterns are returned.
+    The reference table must be standard and have the same kinds of joints. With prismatic joints, several
+    combinations of signs may give equal tables. Only a fit can distinguish these combinations, so the
+    function returns up to `count` combinations.
     """
     reach = max(chain.reach, reference.span, LEAST_SIZE)
     n = len(reference.rows)
@@ -515,9 +525,9 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
-    # If axes nearly coincide, many directions of x are nearly equivalent.
-    # A fit that starts from one of these directions can reach all of them.
-    # Therefore, only the best pattern is kept for each combination of joint signs.
+    # If axes nearly coincide, many directions of x are nearly equivalent. A fit that starts from one of these
+    # directions can reach all of them. Therefore, only the best candidate is kept for each combination of
+    # joint signs.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -536,7 +546,8 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
     """
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
-        # A free offset before the joint can rotate x by half a turn, so the two directions are equivalent.
+        # With an absorber, the two directions of x are equivalent: half a turn of the absorber's joint offset
+        # reverses x.
         circle = math.pi if one.absorber else 2.0 * math.pi
         ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
         found.setdefault((one.senses, one.absorber, *ahead), one)
@@ -544,7 +555,7 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
 
 
 def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
-    """Return the constant pose A_k, with the z axis reversed for each neighbouring joint of sense -1."""
+    """Return the constant pose A_k; reverse the z axis of each neighbouring joint with sign -1."""
     A = chain.constants[k]
     A = _HALF_TURN @ A if before < 0 else A
     return np.array(A @ _HALF_TURN if after < 0 else A)
@@ -553,7 +564,7 @@ def _pose(chain: FrameChain, k: int, before: int, after: int) -> FloatArray:
 def _extend(
     partial: _Partial, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
 ) -> list[_Partial]:
-    """Extend an alignment from joint i to joint i + 1, with each of the two directions of x."""
+    """Extend an alignment from joint i to joint i + 1; try both directions of x."""
     row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
     A = _pose(chain, i + 1, partial.senses[-1], sense)
     delta = row.d - partial.carry if turns[i] and i > 0 else 0.0
@@ -587,7 +598,7 @@ def _extend(
 
 
 def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, float] | None:
-    """Return the row before joint i + 1 with a free offset, and the sign with which this offset rotates x."""
+    """Return the attribute `absorber` of the alignment up to joint i + 1."""
     if not step.free:
         return None
     sign = math.copysign(1.0, math.cos(step.alpha))
@@ -599,7 +610,8 @@ def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, 
 def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
     """Set theta of a prismatic joint to the table's theta.
 
-    This is possible only if a free offset before the joint can absorb the difference.
+    This is possible only if the partial alignment has an absorber. Its joint offset changes by the
+    difference.
     """
     if partial.absorber is None:
         return partial
@@ -621,8 +633,8 @@ def _steps(
     If the axes are nearly parallel in the URDF and in the reference table, a Hayati step is also tried. It
     begins at the offset d of the reference table. In this step the direction of x is free if the distance of
     the axes is nearly zero. The direction of x is also free if a joint is prismatic, because its axis can be
-    shifted; `placed` is then False. For prismatic axes, a step along the common normal is also tried, because
-    a shift does not change the direction of the normal.
+    shifted; `placed` is then False. If beta is 0 in the reference row, a step along the common normal is
+    tried as well. A shift of a prismatic axis does not change the direction of the common normal.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])

@@ -1,9 +1,9 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-A fit of base, tool, zeros and senses absorbs most wrong signs. A table with a wrong sign therefore agrees
-with the URDF after the fit. The corrected table agrees with fewer fitted parameters, usually with none.
-`Search` therefore tries each single change of the table. The likely mistakes are the changes after which the
-fewest parameters must be fitted.
+A fit of base, tool, joint offsets and joint signs compensates for most wrong signs of cells. A table with a
+wrong sign therefore agrees with the URDF after the fit. After its correction, the table agrees even if fewer
+parameters are fitted. Usually, no parameter must be fitted. `Search` therefore tries each single change of
+the table. The likely mistakes are the changes after which the fewest parameters must be fitted.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from urdfkin.model.tree import FloatArray, pose
 
 #: Two angles with a smaller difference (rad) count as equal.
 _SAME_ANGLE = 1e-9
-#: Zeros and senses are fitted after each possible change, if there are at most this number of changes.
-#: A table of nine rows has about this number of possible changes.
+#: If there are more possible changes of the table than this number, joint offsets and joint signs are not
+#: fitted. A table of nine rows has about this number of possible changes.
 _MOST_FITS = 100
 
 
@@ -63,14 +63,14 @@ class Search:
 
         The result is empty if no change reduces the number of these parameters.
 
-        A table that agrees only after a fit of base, tool and zeros has other frames than the URDF, or it has
-        a mistake. The fit cannot distinguish these two cases. For such a table, a change is reported only if
-        the changed table agrees without a fit, or after a fit of the base alone or of the tool alone.
+        Some tables agree only after a fit of base, tool and joint offsets. Such a table has a mistake, or its
+        frames differ from the URDF's frames. The fit cannot distinguish these two cases. A change of such a
+        table is reported only if at most one of base and tool must be fitted after the change.
 
         Args:
             reference: The table.
             fit: Whether parameters may be fitted after a change.
-            agrees: Whether the table agrees after a fit of base, tool, zeros and senses.
+            agrees: Whether the table agrees after a fit of base, tool, joint offsets and joint signs.
         """
         if self._agrees(_model(reference)):
             return ()
@@ -94,7 +94,7 @@ class Search:
         return ()
 
     def _needs_one_thing(self, table: DHTable) -> bool:
-        """Whether a table agrees after a fit of one parameter: base, tool, a joint zero or a joint sign."""
+        """Whether a table agrees after a fit of one parameter: base, tool, a joint offset or a joint sign."""
         if self._with_one_end(table) is not None:
             return True
         model = self._with_zeros(table)
@@ -133,7 +133,7 @@ class Search:
         return found if self._agrees(found) else None
 
     def _with_zeros(self, table: DHTable) -> Model | None:
-        """Fit base, tool, zeros and senses; return the fit that changes the fewest of these parameters."""
+        """Fit base, tool, joint offsets and joint signs; return the fit with the fewest changes."""
         standard, written = to_convention(table, Convention.STANDARD), _model(table)
         models = [
             ends_gathered(fit_freedoms(start, self.tried, turns=False), written)

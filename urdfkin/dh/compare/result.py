@@ -21,9 +21,9 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: Changes of cells explain the whole difference if at most this error remains.
-#: The unit is rad for angles, and metres per metre of reach for positions.
-#: A fit has a far smaller rounding error, and data sheets have a far larger last digit.
+#: If at most this error remains after a change of cells, the change explains the whole difference. The unit
+#: is rad for angles, and metres per metre of reach for positions. The rounding errors of a fit are far
+#: smaller than this number. The last digits in data sheets are far larger.
 EXPLAINED = 1e-9
 #: Finest resolution of printed fitted numbers: rad for angles, metres per metre of reach for lengths.
 _FINEST = 1e-12
@@ -90,8 +90,8 @@ class Fitted:
     Attributes:
         base: Whether the base changes.
         tool: Whether the tool changes.
-        zeros: Number of joints whose zero the fit changes.
-        reversed: Number of joints whose sense the fit reverses.
+        zeros: Number of joints whose zero position the fit changes.
+        reversed: Number of joints whose positive direction the fit reverses.
     """
 
     base: bool = False
@@ -101,7 +101,7 @@ class Fitted:
 
     @property
     def count(self) -> int:
-        """Number of changed parameters: base, tool, each zero and each sense count as one parameter."""
+        """The number of changed parameters: base, tool, zero positions and positive directions of joints."""
         return self.base + self.tool + self.zeros + self.reversed
 
     def __str__(self) -> str:
@@ -140,32 +140,34 @@ class Comparison:
     """Result of a comparison of a table with a URDF.
 
     Attributes:
-        reference: The table with the URDF's joint names and with fitted base, tool, senses and offsets. The
-            method `placement` of this table takes the URDF's coordinates.
+        reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
+            offsets. The method `placement` of this table takes the URDF's coordinates.
         reach: Reach of the robot (metres). Rounding errors are relative to the reach, and angles are
             multiplied by the reach to compare them with lengths.
-        fitted: Whether base, tool, senses and offsets were fitted.
-        senses: Sense of each joint. The table's variable is sense * q + offset, where q is the URDF's joint
-            value.
+        fitted: Whether base, tool, joint signs and joint offsets were fitted.
+        senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
+            joint value.
         offsets: Offset of each joint (radians or metres).
         base: Distance and angle by which the fit moved the base.
         tool: Distance and angle by which the fit moved the tool.
-        metres: Position error (metres) of the fitted table's tip at the worst sample.
-        radians: Orientation error (radians) of the fitted table's tip at the worst sample.
-        most_metres: Proven bound of the fitted table's position error at any joint values, without rounding
-            (`urdfkin.dh.compare.agreement`).
-        most_radians: Proven bound of the fitted table's orientation error at any joint values, without
-            rounding.
-        written_metres: Position error (metres) of the unfitted table at the worst sample.
-        written_radians: Orientation error (radians) of the unfitted table at the worst sample.
+        metres: Largest position error (metres) of the tip on all samples, for the fitted table.
+        radians: Largest orientation error (radians) of the tip on all samples, for the fitted table.
+        most_metres: Proven upper bound (metres) of the tip's position error for all joint values and the
+            fitted table. The bound does not include rounding errors (`urdfkin.dh.compare.agreement`).
+        most_radians: Proven upper bound (radians) of the tip's orientation error for all joint values and the
+            fitted table. The bound does not include rounding errors.
+        written_metres: Largest position error (metres) of the tip on all samples, for the unfitted table.
+        written_radians: Largest orientation error (radians) of the tip on all samples, for the unfitted
+            table.
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
-        instead: The cells that would have to change if base, tool, senses and offsets were not fitted. The
-            list is empty if such changes do not explain the difference, or if too many cells would have to
-            change.
-        hidden: (row, cell) of each cell that has the same effect on the tip as base, tool or joint offsets.
-            The value of such a cell cannot be determined from the tip's poses.
-        mistakes: Single changes of the table after which the fewest parameters must be fitted.
+        instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
+            fitted. The list is empty if such changes do not explain the difference, or if too many cells
+            would have to change.
+        hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. A
+            change of base, tool or joint offsets has the same effect on the tip as a change of this cell.
+        mistakes: The likely mistakes. After the correction of a likely mistake, the fewest parameters must be
+            fitted.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
             cells explain the whole difference, only rounding errors remain.
         tolerance: Tolerance at the tip (metres).
@@ -224,9 +226,9 @@ class Comparison:
 
 
 def resolution(share: float, radians: float) -> float:
-    """Return the resolution of printed fitted numbers.
+    """Return the power of ten to which fitted numbers are rounded for printing.
 
-    The resolution is the smallest power of ten that is at least twice the tip error.
+    It is the smallest power of ten that is at least twice the tip error.
 
     Args:
         share: Position error of the tip, metres per metre of reach.
@@ -366,7 +368,7 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
 
 
 def _cells(found: Comparison, units: Units) -> Parts:
-    """Return the text with the cells that differ, the cells not compared, and the changes without a fit."""
+    """Return the text about the cells in `differences`, `hidden` and `instead`."""
     unit = f"({units.length_name}, {units.angle_name})"
     parts: Parts = []
     if found.differences:

@@ -1,9 +1,10 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
 An *interpretation* of a table consists of a convention, units and column names. With each interpretation, the
-table has a *shape*: the distances and angles of consecutive axes, and the offsets along the axes between
-common normals. The shape does not depend on signs, zeros, base and tool, and is fast to compute. Only the few
-interpretations whose shape is closest to the URDF's shape are fitted.
+table describes a robot of another *shape*. The shape consists of the distances and angles of consecutive
+axes, and of the offsets along the axes between common normals. A change of joint signs, joint offsets, base
+or tool does not change the shape. The shape is fast to compute. Therefore, urdfkin first compares the shapes
+with the URDF's shape. It then fits only the few interpretations with the most similar shapes.
 
 `other_readings` changes the convention, units or column names of the table's plain data (`urdfkin.dh.rows`).
 It then parses the data again. The parser rejects an interpretation with an impossible value, such as an angle
@@ -36,9 +37,9 @@ from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Number of interpretations that are fitted.
-#: Axes with a smaller tilt (rad) count as parallel.
-#: Relative cost of each respect in which an interpretation differs from the one that the file states.
+#: `_TRIED` interpretations are fitted. Axes with a smaller tilt than `_PARALLEL` (rad) are treated as
+#: parallel. `_WORTH` is the relative cost of each difference between an interpretation and the file, for
+#: example another unit.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
 #: An interpretation explains a disagreement if it leaves at most this fraction of the tip error.
 _EXPLAINS = 0.05
@@ -124,7 +125,7 @@ def diagnose(
 def convention_that_fits(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> Convention:
-    """Return the convention with which a table agrees with a path, if the table's file names none.
+    """Find the convention of a table whose file names no convention, by a comparison with a path.
 
     Args:
         chain: The path of the URDF.
@@ -133,8 +134,7 @@ def convention_that_fits(
         where: The table's file.
 
     Raises:
-        InputError: the table agrees equally well with the two conventions, or with neither of them in any
-            units.
+        InputError: both conventions fit equally well, or neither convention fits, even in other units.
     """
     found = list[tuple[Convention, Comparison]]()
     errors = list[InputError]()
@@ -165,13 +165,14 @@ def convention_that_fits(
 
 
 def shape(table: DHTable, scale: float) -> FloatArray:
-    """Return numbers of a table that do not depend on signs, zeros, base and tool.
+    """Return the shape of the robot that a table describes: distances, angles and offsets of its axes.
 
     Lengths are in metres, and angles are in radians times `scale`. For each pair of consecutive axes, the
     result contains the distance and the angle of the two axes. For each axis that is parallel to neither of
     its neighbours, the result also contains the offset along the axis. Offsets along consecutive parallel
-    axes are summed. A prismatic joint has no fixed axis line. Therefore, distances from its axis and offsets
-    next to it are set to zero. Offsets along the first axis are also left out, because the base absorbs them.
+    axes are summed. A prismatic joint has no fixed axis line. Therefore, distances from the axis of a
+    prismatic joint are set to zero, and so are offsets along the neighbouring axes. The offset along the
+    first axis is left out, because a change of the base has the same effect.
     """
     rows = to_convention(table, Convention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False
@@ -190,8 +191,8 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     return np.array(numbers)
 
 
-#: Keys of a row that an interpretation uses, and keys of a table that are ignored.
-#: The keys `_ENDS` are ignored because base and tool are fitted.
+#: From a row, an interpretation uses only the keys `_CELLS`. The keys `_ENDS` of a table are ignored, because
+#: base and tool are fitted.
 _CELLS = ("joint", "kind", "sense", "beta", *ORDER)
 _ENDS = ("base", "tool", "coordinates")
 
@@ -244,7 +245,7 @@ class ConventionHypothesis:
 
 
 def as_said(data: Mapping[str, Any]) -> ConventionHypothesis:
-    """Return the interpretation that the data state; raise InputError for an unknown convention or unit."""
+    """Return the interpretation that a file states; raise InputError for an unknown convention or unit."""
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     convention = convention_of(data["convention"]) if "convention" in data else None
     return ConventionHypothesis(convention, units.lengths, units.angles)
@@ -283,7 +284,7 @@ def _row(row: Mapping[str, Any] | Sequence[Any]) -> dict[str, Any]:
     return {key: value for key, value in named.items() if key in _CELLS}
 
 
-#: Range of plausible lengths in a row of an arm (metres).
+#: Largest and smallest plausible length (metres) in the table of an arm.
 _LONGEST, _SHORTEST = 20.0, 1e-3
 
 

@@ -91,7 +91,7 @@ _LONGEST = 10**9
 class Fractions(Units):
     """SymPy's exact multiples of pi, and exact fractions (0.425 is 17/40).
 
-    Other angles and numbers with many digits are decimals.
+    Angles that are no such multiples are decimals. Numbers with many digits are decimals too.
     """
 
     def length(self, metres: float) -> str:

@@ -3,7 +3,7 @@
 All formats contain the convention, the formula, base and tool. `document` makes one document, which is
 written as plain text, Markdown or HTML. The LaTeX table uses booktabs, names the convention in its caption,
 and is at most as wide as the text. All formats use the same functions for headings, cells, formulas and
-poses. The arguments of these functions are the format's notations of pi, products and names.
+poses. The arguments of these functions define how a format writes pi, products and names.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ HAYATI_FORMULA = {
     Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
 }
 
-#: A number is multiplied by this factor before it is rounded up to some digits.
-#: Without this factor, a rounding error of 1e-12 could increase the last digit of a short number.
+#: A number is multiplied by this factor before it is rounded up to three digits. Without this factor, a
+#: rounding error of 1e-12 could increase the last digit of a short number.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
@@ -131,7 +131,10 @@ def at_most(value: float) -> str:
 
 
 def snap_lines(table: DHTable) -> list[str]:
-    """Return lines of text about snapping: the effect on the tip, then a line for each snapped angle."""
+    """Return lines of text about angles that were snapped to multiples of 15 degrees.
+
+    The first lines state the effect on the tip. Then there is a line for each snapped angle.
+    """
     snap = table.snap
     if snap is None:
         return []
