@@ -76,7 +76,7 @@ _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
 _READ_BACK = 4.0
 #: Number of parameters or poses that a warning names.
 _NAMED = 6
-#: Text of the error for a fit that no correction makes plausible.
+#: Text of the error if a fit is refused and no common mistake in the data explains it.
 _NO_REASON = (
     "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
 )
@@ -239,7 +239,7 @@ def calibrate(
         drop_odd: Whether to exclude outlier poses from the fit; outliers are always reported.
         complete: Whether you will measure full poses and not only positions; used if `poses` is None.
         radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
-        force: Whether to return a fit even if it is not plausible; the objections are then in `plausibility`.
+        force: Whether to return a fit even if it is not plausible; `plausibility` then contains the reasons.
             Joint values that look like degrees are refused in any case, unless `radians` is True.
         every: Whether to write all fitted parameters, including parameters that changed by less than two
             standard deviations.

@@ -2,8 +2,8 @@
 
 The derivation makes these choices; docs/dh.md gives the reasons:
 
-- Frame 0 is at the foot of the perpendicular from the base's origin to the first axis. x_0 is the projection
-  of the base's x axis.
+- The origin of frame 0 is the point of the first axis that is closest to the base's origin. x_0 is the
+  projection of the base's x axis.
 - x_i is along the common normal. The direction of x_i is reversed if theta would exceed a right angle.
 - Between parallel axes d = 0. The row of the last parallel axis contains the whole offset along these axes.
 - The last row reaches the tip if four parameters suffice.

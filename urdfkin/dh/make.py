@@ -48,7 +48,7 @@ def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTa
 
 
 def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tuple[str, ...]:
-    """Return the names of the joints that have opposite senses in the table and in the URDF.
+    """Return the names of the joints that have opposite positive directions in the table and in the URDF.
 
     Raises:
         InputError: the table has other joints, or describes another robot.
@@ -58,7 +58,7 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     ends = replace(there, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [one.senses for one in align(chain, ends)]
-    # Base and tool can absorb the sign of the first and of the last joint.
+    # A change of base or tool can compensate for a reversed sign of the first or of the last joint.
     # Therefore, both signs are tried for each of these two joints.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
@@ -87,14 +87,14 @@ def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float
     - the largest difference of the cells,
     - the power of ten of the largest difference, here with the cells next to a prismatic axis, which can be
       shifted,
-    - the number of different zeros and signs of d,
-    - the number of different ends (base and tool),
-    - the number of reversed senses.
+    - the number of rows with different zero positions, plus the number of rows with different signs of d,
+    - the number of poses that differ, among base and tool,
+    - the number of joints with reversed positive direction.
     """
     n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
         apart = abs(row.a - other.a) / reach
-        if i < n - 1:  # base and tool absorb the transforms before the first and after the last axis
+        if i < n - 1:  # base and tool contain the transforms outside the first and the last axis
             placed = row.kind.turns and found.rows[i + 1].kind.turns
             cells = max(cells, abs(_angle(row.alpha, other.alpha)), apart * placed)
             lines = max(lines, abs(row.beta - other.beta), apart)

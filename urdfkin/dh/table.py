@@ -128,13 +128,12 @@ class DHRow:
 
     @property
     def foot(self) -> float:
-        """Distance to the foot of the common normal, along the next axis (metres); 0 if `beta` is 0.
+        """Distance (metres) along the next axis to the common normal; 0 if `beta` is 0.
 
         In a Hayati row, the x axis intersects the next joint's axis at the distance `a`. The angle `beta`
         tilts the next joint's axis in the direction of x, and `alpha` tilts it normal to x. A row of four
         parameters would use the common normal of the two axes. The distance is measured along the next
-        joint's axis, from its intersection with x to the foot of the common normal. It is |a sin(beta)| /
-        sin^2(tilt).
+        joint's axis, from its intersection with x to the common normal. It is |a sin(beta)| / sin^2(tilt).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")

@@ -546,8 +546,8 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
     """
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
-        # With an absorber, the two directions of x are equivalent: half a turn of the absorber's joint offset
-        # reverses x.
+        # If there is an absorber, its joint offset can reverse x. The two directions of x are then
+        # equivalent.
         circle = math.pi if one.absorber else 2.0 * math.pi
         ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
         found.setdefault((one.senses, one.absorber, *ahead), one)
@@ -610,8 +610,8 @@ def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, 
 def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
     """Set theta of a prismatic joint to the table's theta.
 
-    This is possible only if the partial alignment has an absorber. Its joint offset changes by the
-    difference.
+    Without an absorber, the alignment is unchanged. Otherwise, the joint offset of the absorber changes by
+    the difference of the two angles.
     """
     if partial.absorber is None:
         return partial
