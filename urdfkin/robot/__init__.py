@@ -1463,8 +1463,8 @@ class Robot(Displayable):
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the last row ends at the tip. "flange": the last row ends at the flange, and the tool
                 transform leads to the tip.
-            parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the first
-                row after these axes. "first": the row of the first of these axes. "each": each row contains
+            parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the row
+                of the last of these axes. "first": the row of the first one. "each": each row contains
                 the offset of its own link.
             flip: Names of joints with the opposite sense in the table.
             first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
