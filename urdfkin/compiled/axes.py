@@ -20,26 +20,27 @@ from urdfkin.kinematics import equations as eq
 
 
 def link_axes(own, world):
-    """Return the first argument: the vector expressed in the link's own axes."""
+    """Return `own`, the vector in the link's own axes."""
     return own
 
 
 def world_axes(own, world):
-    """Return the second argument: the vector expressed in world axes."""
+    """Return `world`, the vector in world axes."""
     return world
 
 
 def seen(axes, R, x):
-    """Return a vector x, given in a link's own axes, in the axes that the function `axes` selects.
+    """Return a vector's components in the axes that the function `axes` selects.
 
-    The selected axes are the link's own axes or the world axes.
+    The components of x are in the link's own axes. The function `axes` is `link_axes` or `world_axes`.
     """
     return axes(x, eq.rotate(R, x))
 
 
 def seen_after(axes, S, x):
-    """Return a velocity or acceleration x after the link's frame is rotated by S.
+    """Return the components of a velocity or acceleration x for a link frame that is rotated by S.
 
-    In world axes, x does not change. In the link's own axes, x is converted to components in the new axes.
+    Components in world axes do not change. Components in the link's own axes are converted to the rotated
+    axes.
     """
     return axes(eq.rotate(eq.transposed(S), x), x)

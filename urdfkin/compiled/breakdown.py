@@ -3,8 +3,8 @@
 This module follows sections 7.6 and 7.7. Consider joint k, and assume that all later joints are fixed. Then
 the frame's origin moves relative to link k-1. Its velocity u_k is v_k z x d for a revolute joint k, and v_k z
 for a prismatic joint k. Link k-1 itself rotates with the angular velocity w_{k-1}. The origin is thus a
-moving point in a moving frame, and 7.125 gives the terms of its acceleration. The sum of these terms over all
-joints, from the last joint to the first, is 7.130:
+moving point in a moving frame, and equation 7.125 gives the terms of its acceleration. Equation 7.130 is the
+sum of these terms over all joints, from the last joint to the first:
 
 | kind | term | cause |
 |---|---|---|
@@ -14,13 +14,14 @@ joints, from the last joint to the first, is 7.130:
 | sliding | a_k z | acceleration of a prismatic joint |
 
 The vector d leads from the joint's origin to the frame's origin. This vector d is computed as the sum of the
-interorigin vectors after the joint, as in 7.110. A difference of two positions in the world would lose digits
-if the robot is far from the world's origin or has a long link.
+interorigin vectors after the joint (equation 7.110). A difference of two positions in the world would lose
+digits if the robot is far from the world's origin or has a long link.
 
-The angular acceleration follows from 7.129. Its term a_k z belongs to the kind transverse. Its term
-v_k w_{k-1} x z belongs to the kind coriolis. A planar or floating joint translates and rotates at the same
-time, and its axes of translation rotate with it. Its linear velocity is s, and its angular velocity is o. The
-acceleration of such a joint has one more term, o x s, which belongs to the kind coriolis.
+The angular acceleration follows from equation 7.129. Its term a_k z is added to the transverse acceleration.
+Its term v_k w_{k-1} x z is added to the Coriolis acceleration. A planar or floating joint translates and
+rotates at the same time, and its axes of translation rotate with it. Its linear velocity is s, and its
+angular velocity is o. The acceleration of such a joint has one more term, o x s, which is added to the
+Coriolis acceleration.
 """
 
 from __future__ import annotations
@@ -52,7 +53,9 @@ _SHOWN = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccelerationBreakdown(Displayable):
-    """A frame's acceleration as a sum over joints and kinds.
+    """Contributions of the joints to a frame's acceleration.
+
+    The contribution of a joint is the sum of four kinds: transverse, centripetal, Coriolis and sliding.
 
     Attributes:
         joints: Names of the moving joints from the base to the frame.
@@ -70,7 +73,7 @@ class AccelerationBreakdown(Displayable):
         return f"<AccelerationBreakdown of {len(self.joints)} joints, batch {self.base.shape[:-1]}>"
 
     def contributions(self, sample: tuple[int, ...] = ()) -> Iterator[tuple[str, str, FloatArray]]:
-        """Yield (joint, kind, six numbers) for each contribution of one sample that is not exactly zero."""
+        """Yield (joint, kind, six numbers) for each nonzero contribution of one sample."""
         if self.base[sample].any():
             yield "base", "moving base", self.base[sample]
         for j, joint in enumerate(self.joints):

@@ -2,10 +2,11 @@
 
 Inputs are flat batches, (n, nq) and (n, nv), which `urdfkin.robot` has checked and reshaped. An input row
 that was broadcast to n rows is not copied. A few configurations are computed with Python numbers, and more
-configurations by a compiled kernel (`preload`); the two results have the same bits.
+configurations by a compiled kernel (`preload`). The kernel returns exactly the same doubles as the Python
+numbers.
 
 A large batch is computed with several threads. Each configuration is computed independently of the others, so
-the results have the same bits for any number of threads.
+the results are exactly the same for any number of threads.
 """
 
 from __future__ import annotations
@@ -58,7 +59,8 @@ class How(TypedDict, total=False):
         base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
         out: C-contiguous float64 array of the result's size, for the result.
         threads: Largest number of threads; None uses all processors for large batches.
-        read: Whether the caller reads the results at once, so that they should stay in the caches.
+        read: Whether the caller reads the results immediately. True leaves the results in the processor's
+            caches.
     """
 
     base: FloatArray
@@ -181,8 +183,8 @@ def _interpreted(
 ) -> int | None:
     """Compute a batch with Python numbers; return None, without a result, if a kernel is faster.
 
-    Otherwise return 1 if an input is nan, infinite or too large, else 0. The processor time of the first
-    configurations decides whether a kernel is faster.
+    Otherwise return 1 if an input is nan, infinite or too large, else 0. The function measures the processor
+    time of each configuration, and estimates from it whether a kernel is faster.
     """
     if preload.kernel(name) is not None:
         return None
@@ -292,7 +294,7 @@ def _is_large(base: FloatArray) -> bool:
 
 
 def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Raise an error for a non-finite input or result; called only if one is possible."""
+    """Raise an error if an input or a result is not finite."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))

@@ -19,11 +19,10 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
-#: Lock for the import of Numba and for compilations.
-#: A fork of the process waits for this lock, because the child could not finish an import or a compilation.
-#: A fork acquires several locks in the reverse order of their creation.
-#: The import of Numba uses the lock of `logging`, so this lock must be newer than the lock of `logging`.
-#: This lock is created before the import of Numba begins.
+#: Lock for the import of Numba and for compilations. A fork of the process waits for this lock, because the
+#: child could not finish an import or a compilation. A fork acquires several locks in the reverse order of
+#: their creation. The import of Numba uses the lock of `logging`. The lock `compiling` must therefore be
+#: created after the lock of `logging`. The lock `compiling` is created before the import of Numba begins.
 compiling = lock_over_forks()
 
 #: A function that receives the events of compilations.

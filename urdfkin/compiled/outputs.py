@@ -1,9 +1,9 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-For each output, one function selects the parts of a link's state that the output needs, and one function
-writes the result of a frame. Velocities and accelerations are computed in the axes of their reference frame
-(`urdfkin.compiled.axes`). Jacobian columns are computed in world axes; for LOCAL they are rotated to the axes
-of the frame.
+For each output (for example the velocity), a function `follow_...` selects the parts of a link's state that
+the output needs. A function `emit_...` writes the output of a frame. Velocities and accelerations are
+computed in the axes of their reference frame (`urdfkin.compiled.axes`). Jacobian columns are computed in
+world axes; for LOCAL they are rotated to the axes of the frame.
 """
 
 from __future__ import annotations
@@ -31,17 +31,26 @@ def _unused_vector():
 
 
 def follow_place(state):
-    """Return a link's state with R and p only, which a placement needs."""
+    """Return R and p of a link's state, and mark the other parts as unused.
+
+    A placement needs only R and p.
+    """
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
 def follow_velocity(state):
-    """Return a link's state with R, p, w and vel only, which a velocity needs."""
+    """Return R, p, w and vel of a link's state, and mark alpha and acc as unused.
+
+    A velocity does not need accelerations.
+    """
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
 def follow_acceleration(state):
-    """Return a link's state without vel, which does not occur in equation 7.130."""
+    """Return a link's state, and mark the velocity `vel` as unused.
+
+    Equation 7.130 does not contain this velocity.
+    """
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -114,7 +123,7 @@ def column_none(s, row, to, how, g, c, reference, state):
 
 
 def keep_axis(s, row, axis, state):
-    """Store the axis z_{i-1} and the origin O_{i-1} of a joint, in the world's axes, as 7.85 needs them."""
+    """Store the axis z_{i-1} and the origin O_{i-1} of a joint in world axes, for equation 7.85."""
     R, p = state[0], state[1]
     if axis == 2:
         put_vector(s, row, (R[0][2], R[1][2], R[2][2]))

@@ -1,9 +1,9 @@
-"""Represent a robot's tree by arrays for the recursion, and by the program that a kernel executes.
+"""Compile a robot's tree into arrays, and into a program: the list of instructions that a kernel executes.
 
-The arrays have a step for each moving joint and a row for each frame. As in the textbook, every joint frame
-is rotated so that the joint's axis is z (`turned` returns this rotation). Each revolute joint is then Rz, and
-each prismatic joint is Tz. Fixed joints are merged into the constant offsets between moving joints. A
-compiled tree contains only the joints that move one of its frames.
+The arrays have a row for each moving joint, called a step, and a row for each frame. As in the textbook,
+every joint frame is rotated so that the joint's axis is z (`turned` returns this rotation). Each revolute
+joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into the constant offsets between
+moving joints. A compiled tree contains only the joints that move one of its frames.
 
 The program consists of the instructions for each block of configurations. The instructions are chosen once
 for each robot. There are special instructions for a translation along a coordinate axis and for a rotation
@@ -92,7 +92,9 @@ _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class CompiledTree:
-    """The steps of the recursion, from the base to the ends of the tree, and the frames with results.
+    """The moving joints of a tree (the steps of the recursion) and the frames whose results are requested.
+
+    The steps are sorted from the base to the ends of the tree.
 
     Attributes:
         nq: Length of `q`.
@@ -106,16 +108,18 @@ class CompiledTree:
             is in the axes of the step.
         columns: (columns, 4) a row for every joint velocity of every step; `Column` describes its numbers.
         multipliers: (columns,) the mimic multiplier of each column.
-        leaders: (frames, columns) index of the column to which a column is added: the column itself or, for a
-            mimic joint, the column of the mimicked joint. The index is -1 if the column's joint does not move
-            the frame.
+        leaders: (frames, columns) for each column: index of the first column on the path to the frame with
+            the same joint velocity. The columns of a joint and of its mimic joints have the same joint
+            velocity and are added. The index is -1 if the column's joint does not move the frame.
         places_q: Indices of the coordinates that the recursion needs.
-        parents: (steps,) the step before each step, -1 for the base.
+        parents: (steps,) for each step: index of the previous moving joint on the path from the base, or -1
+            if there is none.
         lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including the offsets of
             fixed joints. The first numbers are the lengths from the parent step to each step. The other
             numbers are the lengths from the step to each frame (in the order of `frames`).
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
-        tilts: (frames,) sum (rad) of `Joint.tilt` over the joints that `depth` counts, in output order.
+        tilts: (frames,) sum (rad) of `Joint.tilt` over all URDF joints between the root and each frame, in
+            output order.
     """
 
     nq: int
@@ -155,7 +159,7 @@ class CompiledTree:
 
     @cached_property
     def turns_only(self) -> bool:
-        """Whether every step is revolute, so that all paths have the same length in every configuration."""
+        """Whether every moving joint is revolute. The sum of the link lengths to a frame is then constant."""
         return bool((self.steps[:, Step.KIND] == Motion.TURN).all())
 
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
@@ -343,15 +347,15 @@ class Head(IntEnum):
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # index at which the list of needed blocks of eight coordinates begins
+    BLOCKS_Q = 4  # start of the list of the needed blocks of eight coordinates
     BLOCKS_V = 5
     BLOCKS_END = 6
-    ANGLES = 7  # index at which the list of joint angles begins
+    ANGLES = 7  # start of the list of joint angles
     ANGLES_END = 8
-    Q = 9  # first scratch row of the coordinates, then of the velocities, the accelerations, and so on
-    V = 10
-    A = 11
-    BASE = 12
+    Q = 9  # first scratch row of the coordinates
+    V = 10  # first scratch row of the velocities
+    A = 11  # first scratch row of the accelerations
+    BASE = 12  # first scratch row of the state of the base
 
 
 #: Number of configurations in a row of scratch memory.
@@ -359,15 +363,16 @@ class Head(IntEnum):
 LANES = 8
 #: Number of integers in an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Each entry of the list of angles has this number of integers.
-#: They are two scratch rows (angle and sine), the index of the mimic rule, and 1 if there is such a rule.
+#: Each entry of the list of angles has this number of integers. The integers are: scratch row of the angle,
+#: scratch row of its sine, index of the mimic rule, and 1 or 0. The last integer is 1 if the joint has a
+#: mimic rule.
 ANGLE_WIDTH = 4
-#: Scratch rows with a fixed purpose: the number 0, the number 1, a result before it is written, an angle.
-#: The last value is the first free row.
+#: Scratch rows for the number 0, the number 1, the result of a frame, and a joint angle. `FIRST_ROW` is the
+#: first row for other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Each entry of a list of pairs has this number of integers.
-#: They describe a Jacobian column: its scratch row, step, index in v, and the scratch row of its sums.
+#: Each Jacobian column in a list of pairs is described by this number of integers. The integers are: scratch
+#: row of the column, step of the joint, index in v, and scratch row of the sums.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -385,7 +390,7 @@ class Program:
     Attributes:
         words: The integers of the program: the numbers of `Head`, then lists and instructions.
         constants: The constants of the instructions.
-        rows: Number of scratch rows of a run.
+        rows: Number of rows of scratch memory that the program needs.
     """
 
     words: IntArray
@@ -405,14 +410,16 @@ class Program:
 
 
 def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
-    """Return the program for the frames of a compiled tree, which stores the program for later calls.
+    """Return the program for the frames of a compiled tree.
+
+    The compiled tree stores the program for later calls.
 
     Args:
         plan: The compiled tree.
         turned: Whether the state is rotated to the axes of each frame. Placements and results in the frame's
             own axes need this rotation.
         columns: Whether Jacobian columns are needed.
-        pairs: Whether each joint, also a mimic joint, has a stored column of its own. Derivatives are
+        pairs: Whether a separate column is stored for each joint, including mimic joints. Hessians are
             computed from pairs of these columns.
     """
     key = turned, columns, pairs
@@ -474,9 +481,9 @@ class _Writer:
                 now = -2  # the current state is now the state of the frame
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """Yield the events of the recursion in order: each is a step or a frame.
+        """Yield (previous step, step, None) for each step, and (previous step, None, frame) for each frame.
 
-        An event is (previous step, index of the step or None, index of the frame or None).
+        The order is that of the recursion.
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -487,9 +494,10 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Write an instruction that saves the state after a step, if a later event starts from this step.
+        """Write an instruction that saves the state after a step, if the state is needed again later.
 
-        An event is later if its index is above `following`.
+        `last` has, for each step, the index of the last event that needs the state after this step. The state
+        is saved if this index is above `following`.
         """
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
@@ -521,7 +529,7 @@ class _Writer:
         return len(self.code) > before
 
     def _rule(self, i: int) -> int:
-        """Return the index in the constants at which a mimic joint's multiplier and offset begin.
+        """Return the index in `constants` of a mimic joint's multiplier, which its offset follows.
 
         For other joints, the result is 0.
         """
@@ -578,9 +586,9 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """Return the scratch row of each number of the frame's (6, nv) matrix.
+        """Return the scratch memory row of each element of the frame's (6, nv) matrix, row by row.
 
-        The argument `row` is the first scratch row of the matrix.
+        The argument `row` is the scratch memory row of the first column.
         """
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
@@ -590,10 +598,10 @@ class _Writer:
         return found
 
     def _pairs(self, f: int) -> list[int]:
-        """Return the list from which a frame's Hessian is computed by pairs of Jacobian columns.
+        """Return integers that tell the kernel where the Jacobian columns for a frame's Hessian are.
 
-        The list has the number of columns, then `PAIR_WIDTH` integers for each column, then the scratch rows
-        of the sums.
+        The first integer is the number of columns. `PAIR_WIDTH` integers for each column follow. The last
+        integers are the scratch memory rows with the elements of the result.
         """
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
@@ -669,7 +677,7 @@ class KernelArgs(IntEnum):
 
 def address(x: NDArray[Any]) -> int:
     """Return the address of an array's first number."""
-    # `x.ctypes.data` runs Python code, which is slow when a batch has displaced this code from the caches.
+    # `x.ctypes.data` is slower, because it runs Python code.
     found: int = x.__array_interface__["data"][0]
     return found
 
@@ -680,7 +688,7 @@ def scratch(program: Program) -> FloatArray:
 
 
 def lines(count: int) -> FloatArray:
-    """Return memory for `count` numbers that begins at the start of a cache line."""
+    """Return an uninitialized array of `count` numbers that is aligned to a cache line."""
     numbers = np.empty(count + _LINE // 8)
     first = -address(numbers) % _LINE // 8
     return numbers[first : first + count]

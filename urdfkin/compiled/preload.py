@@ -1,11 +1,11 @@
 """Decide when a kernel is loaded or compiled; this decision does not import Numba.
 
-A single configuration needs no kernel, because Python computes it in a millisecond with the same bits.
-Importing Numba and reading a kernel from disk takes longer, and compiling takes seconds. Therefore, this
-module sums up the time that the interpreted computation has taken in place of each kernel. When this time
-exceeds `LOADING`, the kernel is read from disk. If the kernel is not on disk and the time exceeds `BESIDE`, a
-second process compiles the kernel. Python computes until the second process has finished. If the time would
-exceed `COMPILING`, this process compiles the kernel itself.
+A single configuration needs no kernel: Python computes exactly the same result in a millisecond. Importing
+Numba and reading a kernel from disk takes longer, and compiling takes seconds. Therefore, this module
+measures how long Python has computed without each kernel. When this time exceeds `LOADING`, the kernel is
+read from disk. If the kernel is not on disk and the time exceeds `BESIDE`, a second process compiles the
+kernel. Python computes until the second process has finished. If the time would exceed `COMPILING`, this
+process compiles the kernel.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ _SAVED = 5e-5
 #: Seconds after which the cache folder is searched again for a kernel that it did not contain.
 _AGAIN = 0.05
 
-#: The modules of the kernels, and the kernels of `warm` in two groups of equal compile time.
+#: Modules that contain the kernels. `load_kernels` compiles the kernels of `_ONE_HALF` and `_OTHER_HALF` in
+#: two processes, so both groups take equally long.
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
@@ -73,7 +74,7 @@ def spend(name: str, seconds: float) -> None:
 
 
 def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
-    """Return a kernel if it is loaded, or if loading or compiling it saves time; else return None.
+    """Return a kernel, or None if computing without the kernel is faster than loading or compiling it.
 
     Args:
         name: Name of the kernel.
@@ -120,7 +121,7 @@ def load(name: str, home: str = RECURSIONS) -> Any:
 def _on_disk(name: str) -> bool:
     """Return whether a kernel is on disk.
 
-    A kernel that was missing is searched again after `_AGAIN` seconds.
+    If a kernel is missing, the next search in the cache folder begins `_AGAIN` seconds later at the earliest.
     """
     folder = cache_folder()
     if folder is None or time.monotonic() < _absent.get((folder, name), 0.0):
@@ -133,7 +134,8 @@ def _on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: Code that ends the second process when its standard input closes, which happens when this process ends.
+#: Code that ends the second process when this process ends. The standard input of the second process closes
+#: at that moment.
 _UNTIL_CLOSED = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"

@@ -1,8 +1,9 @@
 """Compute results of one frame for one configuration in fast calls, for control loops and solvers.
 
-The recursion is the same as for the methods of `Robot`; every lane of the kernel computes the same
-configuration. Each function is bound to a program and to scratch memory, so a call passes only the arrays. If
-another thread is using the same function, the call uses `Robot` instead, with the same result.
+The recursion is the same as for the methods of `Robot`. The kernel computes eight configurations at a time,
+and here all eight are the same configuration. Each function is bound to a program and to scratch memory, so a
+call passes only the arrays. If another thread is using the same function, the call uses `Robot` instead, with
+the same result.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ Fast = Callable[..., FloatArray | None]
 
 
 class _Robot(Protocol):
-    """The robot that computes a result if a fast function does not support the arguments."""
+    """The methods and attributes of `Robot` that a prepared frame uses."""
 
     tree: Any
     verifier: Any
@@ -51,10 +52,11 @@ class _Robot(Protocol):
 class PreparedFrame:
     """Fast evaluation of one frame in one reference frame; create it with `Robot.prepare`.
 
-    Results have the same bits as those of `Robot`. Without `verify` the robot's ledger counts the results as
-    not checked. With `verify` each result is compared with Pinocchio's result, within the same bound as in
-    `Robot`. Contiguous float64 arrays are used directly. For other arguments `Robot` computes the result, or
-    raises the error, as usual. Several threads may share one object, also on free-threaded Python.
+    Results are exactly the same numbers as those of `Robot`. With `verify=True`, urdfkin compares each result
+    with Pinocchio's result and allows the same difference as `Robot`. With `verify=False`, the robot's record
+    of checks counts the results as not checked. Contiguous float64 arrays are used directly. For other
+    arguments `Robot` computes the result, or raises the error, as usual. Several threads may share one
+    object, also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
@@ -95,7 +97,7 @@ class PreparedFrame:
         # The object contains addresses of this process, so a copy is created by `Robot.prepare`.
         return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
 
-    # The functions count or check their results for the ledger themselves.
+    # The fast functions record in the ledger whether each result was checked.
 
     def placement(self, q: Given, out: FloatArray | None = None) -> FloatArray:
         """Return T_world_frame (4, 4) by eq. 7.77.

@@ -1,9 +1,10 @@
 """Number types with which Python runs the recursion without a compiler, for one configuration at a time.
 
-Results have the same bits as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A product is
+Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A
+product is
 stored as its two factors until it is added: x y + z is then one fused multiply-add, rounded once. `zero()`
-and `one()` are the constants 0 and 1. `nothing()` stands for a number that is not needed, and everything that
-is computed from it is also `nothing()`.
+and `one()` are the constants 0 and 1. `nothing()` stands for a number that is not needed. Every number
+computed from `nothing()` is also `nothing()`.
 
 Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel takes
 addresses.
@@ -23,8 +24,8 @@ LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: The sum of this constant and a number below 2^51 is rounded to an integer.
-#: The last bits of the sum are the integer that is nearest to the number.
+#: The sum of this constant and a number below 2^51 is rounded to an integer. The lowest bits of the sum's
+#: mantissa are the number rounded to the nearest integer.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -154,7 +155,10 @@ class Product:
 
 
 class Known:
-    """A number with a known value: 0 or 1, or None for a number that is not needed."""
+    """The constant 0, the constant 1, or a number that is not needed.
+
+    For a number that is not needed, `value` is None.
+    """
 
     __slots__ = ("value",)
 
@@ -187,9 +191,9 @@ class Known:
 
 
 def _double(x: Any) -> float:
-    """Return a number as a float; a product is multiplied and rounded.
+    """Return a number as a float.
 
-    The number must not be `nothing()`.
+    The factors of a `Product` are multiplied. The number must not be `nothing()`.
     """
     if type(x) is Product:
         product: float = x.x * x.y
@@ -202,12 +206,15 @@ _ZERO, _ONE, _NOTHING = Known(0), Known(1), Known(None)
 
 
 def zero() -> Known:
-    """Return the constant 0, whose products and sums need no computation."""
+    """Return the constant 0.
+
+    Products and sums with this constant are simplified: 0 x is 0, and 0 + x is x.
+    """
     return _ZERO
 
 
 def one() -> Known:
-    """Return the constant 1, whose products need no computation."""
+    """Return the constant 1. Products with this constant are simplified: 1 x is x."""
     return _ONE
 
 

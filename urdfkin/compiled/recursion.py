@@ -133,7 +133,9 @@ def prismatic(axes, state, slide, v, a):
 
 
 def free(axes, state, o, u, o_rate, u_rate):
-    """Add the velocity and the acceleration of a planar or floating joint to the displaced state.
+    """Add the velocity and the acceleration of a planar or floating joint to the state.
+
+    The joint's translation and rotation are already part of the state.
 
     The joint's velocity and acceleration are given in the child link's axes.
     """
@@ -259,7 +261,8 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
 
     If x has one row, all configurations use this row. A block of eight numbers is read faster than a shorter
     block. If a configuration ends within a block, numbers of the next configuration are therefore read too,
-    unless they are beyond the end of x. Later reads overwrite the scratch rows of these numbers.
+    unless they are beyond the end of x. The scratch rows with these surplus numbers are overwritten when
+    later inputs are read.
     """
     for i in range(begin, end):
         at = blocks[i]

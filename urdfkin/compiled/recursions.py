@@ -4,8 +4,8 @@ A function takes its arguments in the form that `KernelArgs` describes. The func
 nan, infinite or too large, else 0.
 
 Python can run these functions without a compiler. The functions then take lists instead of addresses. The
-compiled kernel with the same name computes eight configurations at a time
-(`urdfkin.compiled.machine.kernels`), and its results have the same bits.
+module `urdfkin.compiled.machine.kernels` contains compiled kernels with the same names. A compiled kernel
+computes eight configurations at a time, with exactly the same results.
 """
 
 from __future__ import annotations

@@ -373,7 +373,7 @@ def read_skrobot(text: str) -> Reading:
 
 
 def read_newton(path: str) -> Reading:
-    """Read a USD stage with Newton, which computes in single precision; `eval_mimic` moves mimic joints."""
+    """Read a USD stage with Newton, which computes in single precision."""
     import newton  # noqa: PLC0415
 
     builder = newton.ModelBuilder()

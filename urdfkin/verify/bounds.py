@@ -4,9 +4,9 @@ A result is accepted if each of its numbers differs from the oracle's number by 
 
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
-*scale* is the size of the terms whose sum is the number, in the number's unit (`magnitudes`). If two
-computations add the same terms in different orders, their difference is proportional to the size of the
-terms, not to the sum.
+Each number is a sum of terms. *scale* is an upper bound on the sum of the absolute values of these terms, in
+the number's unit (`magnitudes`). If two computations add the same terms in different orders, their difference
+is proportional to this scale, not to the sum.
 
 *k* is the number of roundings to first order in eps (`urdfkin.kinematics.roundings`). Each joint on the path
 adds a fixed number of roundings. Each joint also rotates the vectors of the joints after it. A rotation does
@@ -30,12 +30,12 @@ product with p (WORLD).
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
 worst way. Reports state these differences in multiples of eps * scale, which can be compared between robots.
 
-`magnitudes` runs the forward recursion on the lengths of the vectors. The function evaluates eq. 7.58 and
-7.127 to 7.130 with the number types of `urdfkin.kinematics.number_kinds`. With these number types, no
-intermediate value exceeds the result. One term is different in Pinocchio. Eq. 7.129 has v_i w_{i-1} x z;
-Pinocchio has v_i w_i x z. The difference is v_i^2 z x z, which is 0 except for rounding. This rounding is
-relevant for fast joints with an oblique axis. The scale of alpha includes this rounding, because the scale is
-computed with w_i instead of w_{i-1}.
+`magnitudes` runs the forward recursion with the length of each vector in place of the vector. The function
+evaluates eq. 7.58 and 7.127 to 7.130 with the number types of `urdfkin.kinematics.number_kinds`. With these
+number types, no intermediate value exceeds the result. One term is different in Pinocchio. Eq. 7.129 has v_i
+w_{i-1} x z; Pinocchio has v_i w_i x z. The difference is v_i^2 z x z, which is 0 except for rounding. This
+rounding is relevant for fast joints with an oblique axis. `magnitudes` therefore computes its bound on alpha
+with w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ class Magnitudes:
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) number of roundings of one factor, for all URDF joints on the path, a rotated
-            base, and one additional joint.
+        roundings: (n, frames) upper bound on the number of rounding errors of one factor. The bound is for
+            all URDF joints on the path, for a rotated base, and for one additional joint.
     """
 
     p: FloatArray
@@ -94,7 +94,7 @@ class Magnitudes:
 def magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, base: FloatArray
 ) -> Magnitudes:
-    """Return the magnitudes of the frames of a compiled tree.
+    """Return upper bounds on the terms of each frame's position, velocity and acceleration.
 
     Args:
         plan: The compiled tree.
@@ -123,7 +123,7 @@ def magnitudes(
 
 
 def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Write the magnitudes of the frames with NumPy; for one configuration, use Python numbers."""
+    """Compute `out` with NumPy; for one configuration, compute it with Python numbers."""
     q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
     states = [tuple(_norm(base[at : at + 3]) for at in _OF_BASE)]
     for link in lengths.links:
@@ -135,7 +135,7 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
 
 
 def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Write the magnitudes of the frames with a kernel; they are bitwise equal to those of `_by_steps`."""
+    """Compute `out` with a compiled kernel. The results are exactly those of `_by_steps`."""
     links = lengths.links
     # An input that is the same for all configurations has one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
@@ -164,7 +164,10 @@ def _rows(columns: Sequence[FloatArray]) -> FloatArray:
 
 
 class _Link(NamedTuple):
-    """A step of the recursion on lengths, with the absolute values of the mimic multiplier and constant."""
+    """A moving joint of a compiled tree.
+
+    `multiplier` and `constant` are the absolute values of its mimic rule's numbers.
+    """
 
     kind: int
     q: int
@@ -176,7 +179,11 @@ class _Link(NamedTuple):
 
 
 class _End(NamedTuple):
-    """A frame, with its step, its index in the output, and the length from the step to the frame."""
+    """A frame of a compiled tree.
+
+    `length` is the length of the path from the last moving joint `step` to the frame, and `place` is the
+    frame's index in the output.
+    """
 
     step: int
     place: int
@@ -272,10 +279,11 @@ _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The bound k * eps * scale of a quantity; the arrays `k` and `scale` broadcast against the results.
+    """The bound k * eps * scale of a quantity. The arrays `k` and `scale` broadcast against the results.
 
     Attributes:
-        scale: Size of the terms, in the result's units; 0 where the results must be equal.
+        scale: Upper bound on the sum of the absolute values of a number's terms, in the number's unit. The
+            scale is 0 if the numbers must be equal.
         k: Allowed difference in multiples of eps * scale.
     """
 
@@ -308,12 +316,12 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
 def about_the_root(size: Magnitudes) -> Magnitudes:
     """Return the magnitudes for a comparison of urdfkin with MuJoCo.
 
-    MuJoCo refers velocities, accelerations and Jacobian columns to a centre of mass, which is at the root
-    here (`urdfkin.verify.mujoco`). At the end, MuJoCo converts them to the frame's origin. The distance of
-    the centre of mass from a joint or from the frame is at most the length of the path. Therefore, lever arms
-    are at most 2 p. Both conversions, to the centre of mass and to the frame, use a cross product with a
-    lever arm. Each cross product adds one factor, which at most doubles the number of factors. Each joint has
-    `MUJOCO` roundings instead of `ROUNDINGS`.
+    MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass. In the models of
+    `urdfkin.verify.mujoco`, this centre of mass is at the root. At the end, MuJoCo converts the results to
+    the frame's origin. The distance of the centre of mass from a joint or from the frame is at most the
+    length of the path. Therefore, lever arms are at most 2 p. Both conversions, to the centre of mass and to
+    the frame, use a cross product with a lever arm. With these cross products, the number of factors is at
+    most twice as large. The bound allows `MUJOCO` roundings for each joint instead of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -332,8 +340,10 @@ class Conversion(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the errors of angles over the joints of the path, in eps rad.
-        rules: Number of mimic rules on the path; each rule in a chain of rules counts.
-        lengths: (steps + 1,) what the sizes of displacements exceed `CompiledTree.lengths` by, m.
+        rules: Number of mimic rules for the joints on the path. For a joint that mimics a mimic joint, both
+            rules are counted.
+        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. They are positive if offsets of
+            mimic rules cancel.
     """
 
     angles: FloatArray
@@ -344,13 +354,14 @@ class Conversion(NamedTuple):
 def against_true_values(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: Conversion
 ) -> Magnitudes:
-    """Return the magnitudes for a comparison of one program with true values, rounded to 17 digits.
+    """Return the magnitudes for a comparison of one program's results with the true values.
 
-    The true values are those of the decimals in the URDF and of the doubles q, v and a. They are rounded to
-    17 digits. `ROUNDINGS` = 24 roundings are allowed for each joint, and one program has at most 16.8
-    roundings (`urdfkin.kinematics.roundings`). The other 7.2 roundings cover the conversions to doubles: half
-    an eps each for an offset, an axis and the true value itself. An axis is used in two rotations, so it
-    counts twice. Two kinds of numbers need additional roundings:
+    The true values are computed from the decimals in the URDF and from the doubles q, v and a. They are
+    rounded to 17 digits. `ROUNDINGS` = 24 roundings are allowed for each joint, and one program has at most
+    16.8 roundings (`urdfkin.kinematics.roundings`). The other 7.2 roundings are enough for the conversions of
+    decimals to doubles. The offset, the axis and the true value each have a conversion error of half an eps.
+    An axis is used in two rotations, so its error is added twice. Two kinds of numbers need additional
+    roundings:
 
     - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint turn by
       at most (|roll| + |pitch| + |yaw|) / 2 eps.
@@ -358,18 +369,21 @@ def against_true_values(
       most (3 |m x| + |c|) / 2 eps. The rounding of c has an error of at most |c| / 2 eps, and the error of x
       is multiplied by |m|.
 
-    A program may also first multiply out a chain of r rules, from either end, to M q + C. Each number then
-    has the same roundings, except that sums are rounded: r - 1 sums of C and one sum with M q. None exceeds
-    X, the size of the value with the sizes of all terms added up: |q| for an independent joint, |m| X' + |c|
-    for a mimic joint. The error of the value is therefore at most (r - 1) / 2 X eps more.
+    A mimic joint may mimic another mimic joint, so r rules can form a chain. A program may combine the rules
+    of a chain to one rule M q + C. The combined rule has the same roundings as the separate rules, except for
+    its sums: r - 1 sums in C, and the sum of M q and C. Let X be the value that results if all terms are
+    replaced by their absolute values. For an independent joint, X is |q|. For a mimic joint, X is |m| X' +
+    |c|, where X' is the X of the mimicked joint. No sum exceeds X. The error of the combined rule's value is
+    therefore at most (r - 1) / 2 X eps larger.
 
-    A revolute mimic joint rotates all vectors after the joint by its error. An error of 1 eps rad changes
-    each factor by at most 1 eps of its length.
+    The error of a revolute mimic joint's value rotates all later vectors of the path. An error of 1 eps rad
+    changes each factor by at most 1 eps of its length.
 
     The displacement of a prismatic mimic joint has an error of at most 3/2 r X eps, because no term of X has
-    more than 3 r roundings, neither with the rules one by one nor multiplied out. If the offsets of a chain
-    cancel, |M q| + |C| is far below X. The lengths of the path therefore contain X. Then 3/2 eps for each
-    rule are enough, also for rates, which have fewer roundings.
+    more than 3 r roundings. This is true for separate rules and for a combined rule. If the offsets of a
+    chain cancel, |M q| + |C| is far below X. Therefore, X is the length of such a joint's displacement in the
+    computation of the magnitudes. Then 3/2 eps for each rule are enough. They are enough for the joint's
+    velocity and acceleration too, which have fewer roundings.
 
     Args:
         plan: The compiled tree of one frame.
@@ -395,19 +409,20 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
-    A body's position, the anchors of its joints and a slide's reference value are added. The tree contains
-    this sum as a constant. MuJoCo computes the sum for each configuration. If the sum of the lengths of these
-    terms exceeds the length of the path, the scale of positions is this sum of lengths.
+    In an MJCF file, the offset of a body is a sum of several vectors: `pos` of the body, `pos` of its joints,
+    and a vector for `ref` of a slide joint. The tree contains this sum as a constant. MuJoCo computes the sum
+    for each configuration. The vectors can be longer than their sum. The scale of positions is therefore the
+    length of the path or `lengths`, whichever is larger.
 
     MuJoCo rotates a hinge by the rounded difference fl(q - ref); the tree rotates it by ref and by q. The
     rounding error of the difference is at most (eps/2) (|q| + |ref|) rad. All bodies after the hinge are
     rotated by this angle. An entry of a rotation matrix changes by at most this angle. A coordinate of a
     position changes by at most this angle times the length. The bound allows twice these changes, which
-    covers terms of second order. Relative to k eps scale, the allowed change is `angles` / k.
+    covers terms of second order. The scale is therefore multiplied by 1 + `angles` / k.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
-        lengths: (n, frames) sum of the lengths of the terms in MuJoCo, m.
+        lengths: (n, frames) sum of the lengths of all these vectors on the path to the frame, m.
         angles: (n, frames) sum of |q| + |ref| over the hinges with a reference value, rad.
     """
     scale = bound.scale.copy()
@@ -418,7 +433,7 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
 
 @_BEYOND
 def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """Return (n, frames, 6), the size of the terms of [linear; angular] velocities."""
+    """Return the scale of the bound on velocities [linear; angular], (n, frames, 6)."""
     linear = size.vel
     if reference.at_world:
         linear = eq.point_velocity(linear, size.w, size.p)
@@ -427,18 +442,19 @@ def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 
 @_BEYOND
 def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """Return (n, frames, 6), the size of the terms of [linear; angular] accelerations.
+    """Return the scale of the bound on accelerations [linear; angular], (n, frames, 6).
 
     Pinocchio computes classical accelerations from spatial accelerations. The difference is the term w x vel,
     which the scale includes.
 
-    An acceleration breakdown groups the terms by joints. The scale is also valid for the sum of a breakdown.
-    Let d_k be the vector from joint k to the frame, and let w_k be the sum of the joint velocities up to
-    joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the length (w_k^2 - w_{k-1}^2)
-    d_k. Over all joints, these lengths add up to the sum of w_k^2 times the length of link k, as in eq.
-    7.130. The vectors d_k are sums of the vectors between joint origins and have the rounding errors of the
-    sums in eq. 7.77. The sum of the 4 n terms of n joints has n + 3 roundings. The roundings of d_k and of
-    this sum are below the 2 eps that each joint is allowed for sums.
+    The scale is also valid for the sum of an `AccelerationBreakdown`, which contains the contributions of the
+    joints to an acceleration. Let d_k be the vector from joint k to the frame, and let w_k be the sum of the
+    joint velocities up to joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the
+    length (w_k^2 - w_{k-1}^2) d_k. Over all joints, these lengths add up to the sum of w_k^2 times the length
+    of link k, as in eq. 7.130. The vectors d_k are sums of the vectors between joint origins and have the
+    rounding errors of the sums in eq. 7.77. A breakdown for n joints has 4 n terms, and their sum is computed
+    with n + 3 roundings. The bound contains 2 eps for the sums at each joint. The roundings of d_k and of the
+    sum of 4 n terms are below this part of the bound.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -449,7 +465,10 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
 
 @_BEYOND
 def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
-    """Return (n, frames, 6), the size of the terms of an IMU reading, including gravity (3,)."""
+    """Return the scale of the bound on IMU readings, (n, frames, 6).
+
+    The argument `gravity` (3,) is the gravity vector.
+    """
     return _six(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
 
 
@@ -471,10 +490,10 @@ def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 @_BEYOND
 def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """Return (n, frames, 6, nv), the size of the terms of Jacobians.
+    """Return the scale of the bound on Jacobians, (n, frames, 6, nv).
 
-    The size in linear rows is the path's length for revolute joints and 1 for prismatic joints. For joints
-    that are not on the path, the size is 0.
+    In the linear rows, the scale of a revolute joint's column is the length of the path. The scale of a
+    prismatic joint's column is 1. For joints that are not on the path, the scale is 0.
     """
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
@@ -483,11 +502,11 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 
 @_BEYOND
 def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """Return (n, frames, 6, nv), the size of the terms of J-dot.
+    """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
-    The column of a revolute joint is at most as long as the path to the frame. The lever arm of the column
-    changes at most as fast as the frame's origin moves. In LOCAL the numbers are components along the frame's
-    axes, which rotate.
+    The column of a revolute joint is at most as long as the path to the frame. The vector d of the column z x
+    d changes at most as fast as the frame's origin moves. In LOCAL, J-dot contains components along the
+    frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -500,11 +519,10 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     return _six_rows(linear, angular)
 
 
-#: Number of products in a linear row of Pinocchio's Hessian, for the joints i and j of an entry.
-#: First number of a pair: z x (z x d) of two revolute joints.
-#: Second number of a pair: z x z of a revolute joint and a prismatic joint.
-#: The first pair is for j before or equal to i.
-#: The second pair is for j after i.
+#: Numbers of products that Pinocchio adds for the derivative of the linear part of column i with respect to
+#: joint j. Use the first pair if joint j is joint i or is nearer to the root, else the second pair. For two
+#: revolute joints, use the pair's first number: it counts the products z x (z x d). For a revolute and a
+#: prismatic joint, use the pair's second number: it counts the products z x z.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -514,19 +532,20 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 
 @_BEYOND
 def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
-    """Return (n, frames, 6, nv, nv), the size of the terms of Hessians, summed over pairs of columns.
+    """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
-    The column of a mimic joint counts for the coordinate of the mimicked joint. A lever arm d is never longer
-    than the path. Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin.
-    Pinocchio adds these products:
+    The scale is a sum over pairs of Jacobian columns. The column of a mimic joint is added to the column of
+    the mimicked joint. A lever arm d is never longer than the path. Pinocchio computes each entry from two
+    Jacobian columns c = [z x d; z] at the world origin. Pinocchio adds these products:
 
     - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
     - one more to move the result to the frame's origin p, p x (w_1 x w_2)
     - two more to move the other column there, (v - p x w) x w
 
     These counts give the numbers five, two and three in `_PAIR_TERMS`. urdfkin needs the single product z x
-    (z x d), or the two products of c_1 x c_2. In LOCAL, R rotates the two columns first. urdfkin then has two
-    products of five factors (R, z, R, z, d). The bound allows more: three products of four factors.
+    (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first rotates the two columns by R. urdfkin
+    then computes two products of five factors: R, z, R, z and d. The bound is larger than these products
+    need: it allows three products of four factors.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -554,22 +573,25 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
 def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
-    The position rows have the Jacobian's bound. The angles have the axes e_i, u and t = R e_k
-    (`analytical_reference`). The row of the middle angle is u . w. The rows of the outer angles are r . w,
-    where r is a vector of the reciprocal basis of the axes. Here |u| = 1 and |r| = 1 / s, where s = |e_i x t|
-    is the sine or cosine of the middle angle.
+    The rows of positions have the same bound as in the velocity Jacobian. The axes of the first, middle and
+    last angle are e_i, u and t = R e_k (`analytical_reference`). Let w be the angular part of a column of the
+    velocity Jacobian. The column's element for the middle angle is u . w. The elements for the first and last
+    angle are r . w, where r is a vector of the reciprocal basis of the axes. Here |u| = 1 and |r| = 1 / s,
+    where s = |e_i x t| is the sine or cosine of the middle angle.
 
     Let the error of t be delta = k eps. Then u rotates by delta / s. Let r' be the reciprocal vector of t.
-    Then r changes by -(r . du) u - (r . dt) r', which has at most the length 2 delta / s^2. Here s is the
-    smallest possible value, `apart` - delta. Let the relative error of w be delta too. Then the errors are:
+    Then r changes by the vector -(r . du) u - (r . dt) r'. The length of this vector is at most 2 delta /
+    s^2. Here s is the smallest possible value, `apart` - delta. Let the relative error of w be delta too.
+    Then the errors are:
 
-    - outer angles: 2 delta / s^2 + delta / s <= 3 delta / s^2
+    - first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
 
-    The Jacobian's bound has two factors, that is 2 delta. The scales are therefore 1.5 / s^2 and 1 / s times
-    the Jacobian's scale. In urdfkin and in the reference, arctan2 and the sine of the angle add rounding
-    errors of about 3 eps. Products and quotients add about 10 eps. `Magnitudes.roundings` counts one
-    additional joint, which covers these errors.
+    The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale of the
+    velocity Jacobian is therefore multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the
+    middle angle. In urdfkin and in the reference, arctan2 and the sine of the angle add rounding errors of
+    about 3 eps. Products and quotients add about 10 eps. `Magnitudes.roundings` contains the roundings of one
+    additional joint, which are more than these errors.
 
     Args:
         bound: Bound of the Jacobian.
@@ -588,10 +610,11 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound (n, frames, 7, nv) of analytical Jacobians with quaternions, which are never singular.
 
-    The position rows have the Jacobian's bound. Let delta be the error of R. The numbers of 4 q q^T are
-    linear in R. The longest row of 4 q q^T has at least the length 2, and its error is below 4.6 delta.
-    Therefore, the error of q is below 2.3 delta. Relative to w, half the quaternion product of w and q has an
-    error of (2.3 + 1) / 2 delta. This error is below the 2 delta of the Jacobian's two factors.
+    The rows of positions have the same bound as in the velocity Jacobian. Let delta be the error of R. The
+    elements of the matrix 4 q q^T are linear functions of R. The longest row of 4 q q^T has at least the
+    length 2, and its error is below 4.6 delta. Therefore, the error of q is below 2.3 delta. The derivative
+    of q is half the quaternion product of w and q. Its error is (2.3 + 1) / 2 delta |w|. This error is below
+    the bound 2 delta |w| on the angular velocity in the velocity Jacobian.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
@@ -599,7 +622,7 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the limit of |qw| below which rounding can change the sign of qw.
 
-    The limit 1.5 k eps = 3 delta exceeds the error 2.3 delta of q.
+    The limit is 1.5 k eps = 3 delta. It is above 2.3 delta, the error of q.
     """
     return 1.5 * EPS * result_k(bound, leading)
 

@@ -27,13 +27,14 @@ _PLAIN = np.ndarray, np.memmap
 
 
 class Part(NamedTuple):
-    """Some configurations of a call, for the recursion and for the oracle.
+    """A part of a call's configurations, as inputs of urdfkin's recursion and as inputs of the oracle.
 
     Attributes:
         plan: The compiled tree.
         reference: Reference frame; placements ignore it.
         q: (n, nq).
-        rates: (n, nv) v, or v and a, according to the quantity.
+        rates: Arrays (n, nv): empty for a placement, (v,) for a velocity, (v, a) for an acceleration, for
+            example.
         state: (n or 1, 24) state of the moving base.
         query: The same configurations for the oracle, converted independently from the user's arguments.
         options: Other arguments of the method, by name.
@@ -167,14 +168,14 @@ class Call:
             raise
 
     def part(self, part: slice | IntArray) -> Part:
-        """Return the given configurations of this call, for the check."""
+        """Return the configurations with the given indices, so that they can be checked."""
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
         query = self.question.rows(part)
         return Part(self.plan, self.reference, self.q[part], rates, state, query, self.options)
 
     def index(self, k: int) -> tuple[int, ...]:
-        """Return the index of the flat sample `k` in the caller's batch."""
+        """Return the index in the caller's batch of sample k of the flat batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
 

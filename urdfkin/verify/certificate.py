@@ -88,7 +88,7 @@ class Comparison:
         worst: Largest difference between a number of urdfkin and the same number of the oracle, in multiples
             of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
-        index: Index of the sample with the largest ratio, in the leading axes of the results.
+        index: Index of the result with the largest ratio, in the array of results.
     """
 
     results: int
@@ -98,7 +98,7 @@ class Comparison:
 
     @classmethod
     def of_nothing(cls) -> Comparison:
-        """Return the comparison of an empty batch, which counts as agreement."""
+        """Return the comparison of an empty batch. Its `agrees` is True."""
         return cls(0, 0.0, 0.0, ())
 
     def __add__(self, other: Comparison) -> Comparison:
@@ -126,17 +126,20 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
     """Compare urdfkin's results with the oracle's results.
 
     Args:
-        ours: urdfkin's results. The first `axes` axes index the results; the other axes index the numbers of
-            one result.
+        ours: urdfkin's results. The remaining axes after the first `axes` are those of one result. For
+            placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
         theirs: The oracle's results, of the same shape.
         bound: Bound on the difference. The arrays `scale` and `k` of the bound broadcast against the results.
-        axes: Number of axes that index the results.
+        axes: Number of leading axes that are not axes of one result.
     """
     return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
 
 
 def comparison_of(units: FloatArray, bound: Bound) -> Comparison:
-    """Return the summary of the differences `units`, which are in multiples of eps * scale."""
+    """Return the comparison of results whose largest differences are given.
+
+    The differences `units`, one for each result, are in multiples of eps * scale.
+    """
     if not units.size:
         return Comparison.of_nothing()
     share = units / result_k(bound, units.shape)
@@ -320,13 +323,14 @@ class Certificate(Displayable):
 
 @dataclass(slots=True)
 class Account:
-    """The entries of a ledger for one quantity.
+    """Numbers of checked and unchecked results of one quantity.
 
     Attributes:
         checked: Combined comparison of all results that the oracle confirmed.
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         not_asked_for: Number of results of calls with verify=False.
-        counters: Arrays and indices of the counters in which fast evaluators count their unchecked results.
+        counters: Pairs (array, index). The element of the array with this index is the number of unchecked
+            results that a fast evaluator has returned.
     """
 
     checked: Comparison = field(default_factory=Comparison.of_nothing)
@@ -340,7 +344,7 @@ class Account:
         return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
     def line(self, quantity: str) -> Line:
-        """Return the certificate's line for these entries."""
+        """Return the certificate's line about this quantity."""
         found = self.checked
         return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
 
@@ -353,7 +357,7 @@ class Ledger:
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: str) -> Account:
-        """Return the account of a quantity. The caller may keep the account and use it again."""
+        """Return the account of a quantity. Later calls return the same object."""
         if (known := self._accounts.get(quantity)) is not None:
             return known
         with _entering:
@@ -394,5 +398,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # A copy of a ledger in another process starts without entries.
+        # A copy of a ledger contains no counts, because it may be in another process.
         return type(self), ()

@@ -28,11 +28,11 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     """Return, for each result, the largest value of `bounds.disagreement` over the result's numbers.
 
     Args:
-        ours: urdfkin's results. The first `axes` axes index the results; the other axes index the numbers of
-            one result.
+        ours: urdfkin's results. The remaining axes after the first `axes` are those of one result. For
+            placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
         theirs: The oracle's results, of the same shape.
         scale: Scale of the bound; it broadcasts against the results.
-        axes: Number of axes that index the results.
+        axes: Number of leading axes that are not axes of one result.
 
     Returns:
         An array with the shape of the leading axes, in multiples of eps * scale.
@@ -51,7 +51,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        if len(size) < n:  # scratch memory is needed if results share a scale
+        if len(size) < n:  # several results share a row of the scale: the kernel needs scratch memory
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)
         kernel(one, other, size, worst, out_bits, unit, units, bits)

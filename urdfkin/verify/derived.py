@@ -68,12 +68,12 @@ def check_relative_placement(
 ) -> tuple[FloatArray, Bound]:
     """Return relative placements (n, frames, 4, 4) from an oracle, and their bound.
 
-    The placement is the pose of frame b relative to frame a. Let s_a and s_b be the path lengths of the
-    frames. Let k_a and k_b be the numbers of roundings of their placements. The position is R_a^T (p_b -
+    A relative placement is the pose of frame b relative to frame a. Let s_a and s_b be the path lengths of
+    the frames. Let k_a and k_b be the numbers of roundings of their placements. The position is R_a^T (p_b -
     p_a). The errors of p_a and p_b add k_b s_b + k_a s_a to the error of the position. The error of R_a adds
     k_a |p_b - p_a|. Since |p_b - p_a| <= s_a + s_b, the sum is at most (2 k_a + k_b) (s_a + s_b). The error
     of the product of rotations is k_a + k_b. The difference and the products add rounding errors of about 5
-    eps. Each k counts one additional joint, which covers these rounding errors.
+    eps. Each k contains the roundings of one additional joint, which are more than 5 eps.
 
     Args:
         bound_of: Function for the bound of placements in the world.

@@ -1,4 +1,8 @@
-"""Kernels of checks: the largest difference of each result, lengths, and the columns of mimic joints."""
+"""Compiled functions for the checks.
+
+`worst` compares results, `lengths` computes magnitudes for error bounds, and `coupling` adds columns of mimic
+joints.
+"""
 
 from __future__ import annotations
 
@@ -60,9 +64,9 @@ def _units(difference, size):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
-    """Return the largest difference between two rows of finite numbers; the compiler may reorder comparisons.
+    """Return the largest difference between two rows of finite numbers.
 
-    The scale is in row `k`.
+    The scale is in row `k`. The compiler may reorder the comparisons.
     """
     largest = 0.0
     for j in range(ours.shape[1]):
@@ -83,9 +87,10 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each group of three numbers with a common scale.
+    """Write the largest of three differences for each group of three numbers.
 
-    The difference is in multiples of eps * scale and may be NaN or inf.
+    The three numbers of a group have the same scale. The difference is in multiples of eps * scale and may be
+    NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -101,8 +106,8 @@ def _divide_threes(ours, theirs, unit, width, units):
 def _most(x, count):
     """Return the bit pattern of the largest of several non-negative numbers, which may be inf or NaN.
 
-    As integers, the bit patterns of non-negative numbers have the same order as the numbers. Some processors
-    set the sign bit of NaN, so the sign bit is removed.
+    If x < y for two non-negative doubles, the bit pattern of x, read as an integer, is less than that of y.
+    Some processors set the sign bit of NaN, so the sign bit is removed.
     """
     most = 0
     for j in range(count):
@@ -122,10 +127,10 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
         theirs: The oracle's results.
         scale: Scale of the bound.
         out: The largest difference in each row.
-        out_bits: The memory of `out`, as integers.
+        out_bits: View of `out` as an array of integers.
         unit: Scratch memory of the size of `scale`. It is used only if `scale` has fewer rows than `out`.
         units: Scratch memory for one row.
-        bits: The memory of `units`, as integers.
+        bits: View of `units` as an array of integers.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):
@@ -164,10 +169,11 @@ def coupling(full, columns, index, factor, out):
     return 0
 
 
-# -- the recursion on lengths --------------------------------------------------------------------------------
+# -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
-#: Number of values in the state of a link, and number of lengths of a planar or floating joint.
+#: `_STATE` is the number of values in the state of a link. `_FREE` is the number of values in `free` for a
+#: planar or floating joint.
 _STATE = _FREE = 5
 
 
@@ -216,7 +222,7 @@ def _of_row(x, row, at):
 
 @helper()
 def _read(x, first, m, at, factor, to):
-    """Write the product of a factor and |x| in column `at`, for m configurations.
+    """Write factor * |x[k, at]| to the array `to` for m configurations k, from `first` on.
 
     An array `x` with one row is used for all configurations.
     """
@@ -248,19 +254,21 @@ def _over_free(before, after, first, m, d, free, at):
 
 @kernel(TABLE, ROWS, TABLE, NUMBERS, ROWS, ROWS, ROWS, ROWS, ROWS, STATES, SCRATCH)
 def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
-    """Write the five magnitudes of each configuration and frame, by the recursion on lengths.
+    """Write `Magnitudes.p`, `w`, `vel`, `alpha` and `acc` for each configuration and frame.
 
     Args:
-        links: Kind, index in q, index in v, and parent of each step.
-        sizes: Length, mimic multiplier and mimic constant of each step.
-        ends: For each frame: its step, and its index in the output.
-        tips: Length from the step to the frame.
+        links: Kind, index in q, index in v, and previous moving joint (parent) of each moving joint.
+        sizes: Length of the path from the previous moving joint, mimic multiplier and mimic constant of each
+            moving joint.
+        ends: For each frame: the last moving joint before it, and its index in the output.
+        tips: Length of the path from the last moving joint to each frame.
         q: Coordinates. In q, v, a, free and base, an array with one row is used for all configurations.
         v: Joint velocities.
         a: Joint accelerations.
-        free: Displacement, velocities and accelerations of each planar and floating joint.
+        free: Five lengths for each planar and floating joint (`urdfkin.verify.bounds._free_lengths`).
         base: State of the base.
-        s: Scratch memory for a block of configurations, with one state for each step and two more states.
+        s: Scratch memory for a block of configurations. It has the states of the base and of all moving
+            joints, and one more state.
         out: p, w, vel, alpha, acc.
     """
     frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]

@@ -2,9 +2,10 @@
 
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
 the conversion from the MJCF file to the tree. Therefore `load` compares the tree with MuJoCo's own model of
-the file. `load` compares the placements of bodies and sites, and the equalities that became mimic rules.
-`load` also compares the placements with those of Pinocchio's MJCF reader. Pinocchio's reader is known to read
-some files differently, so a difference from this reader is reported but is not an error.
+the file. `load` compares the placements of bodies and sites. `load` also compares the mimic rules of the tree
+with the joint equalities in MuJoCo's model. In addition, `load` compares the placements with those of
+Pinocchio's MJCF reader. Pinocchio's reader is known to read some files differently, so a difference from this
+reader is reported but is not an error.
 """
 
 from __future__ import annotations
@@ -154,8 +155,8 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
         A line of text about the result, for the certificate.
 
     Raises:
-        OracleError: MuJoCo's placement of a body or site differs by more than the bound, or MuJoCo couples
-            other joints.
+        OracleError: MuJoCo's placement of a body or site differs by more than the bound. Or a mimic rule of
+            the tree differs from the joint equalities in MuJoCo's model.
     """
     tree, answer = verifier.tree, read.answer
     q = unpacked(answer["q"])

@@ -1,8 +1,8 @@
 """Check the URDF text that urdfkin writes for a `pinocchio.Model` or for a Denavit-Hartenberg table.
 
-Pinocchio checks a robot's results with the robot's URDF text. This module checks the text itself. It compares
-the placements of the robot with those of the model, or Pinocchio's placements of the tip with the products of
-the table's own matrices (eq. 7.64).
+Pinocchio checks a robot's results with the robot's URDF text. This module checks the text. For a model, it
+compares the placements of all links with the model's placements. For a table, it compares Pinocchio's
+placements of the tip with the product of the table's matrices (eq. 7.64).
 """
 
 from __future__ import annotations
@@ -122,8 +122,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # The matrices of base and tool may be rotations to six digits only.
-    # The URDF contains exact rotations.
+    # The rotation matrices of base and tool may be rounded to six digits. The URDF contains exact rotations.
     rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
     turn = EPS * of_rows_read_back(rows) + defect
     allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
@@ -137,6 +136,9 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return the distance of the base and tool matrices from rigid motions; they may have six digits only."""
+    """Return the sum of |R^T R - 1| over the rotation matrices R of base and tool.
+
+    The numbers of these matrices may be rounded to six digits.
+    """
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -1,20 +1,21 @@
 """The oracle MuJoCo.
 
 MuJoCo reads the positions and axes of links and joints from the URDF text with its own parser. MuJoCo
-computes with unit quaternions, and stores six-vectors at a centre of mass. urdfkin and Pinocchio use neither
-method. Before MuJoCo reads the text, this module makes these changes:
+computes with unit quaternions, and its six-vectors have a centre of mass as the reference point. urdfkin and
+Pinocchio use neither method. Before MuJoCo reads the text, this module makes these changes:
 
 - Meshes and inertials are removed. Each link becomes a body. Only the root has a mass, so that the centre of
   mass, MuJoCo's point of reference, is the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
-- Floating and planar joints become slides with a ball joint or a hinge, because MuJoCo's free joint can
-  connect a body to the world only.
+- A floating joint becomes three slide joints and a ball joint. A planar joint becomes two slide joints and a
+  hinge. MuJoCo's own free joint can connect a body to the world only.
 - The rules of `rules_of_text` couple the mimic joints. MuJoCo would turn the mimic rules into constraints,
   and its kinematics ignores constraints.
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. If J is MuJoCo's Jacobian, the robot's Jacobian
-is J S. S contains the multipliers of mimic joints, and rotates from a floating joint's own axes to the axes
-of the three slides that replace this joint.
+is J S. The matrix S contains the multipliers of mimic joints. For a floating or planar joint, S also contains
+a rotation matrix. urdfkin's linear velocity of such a joint is in the axes of the child link. The axes of the
+slide joints that replace the joint are fixed in the parent link.
 """
 
 from __future__ import annotations
@@ -335,8 +336,8 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The velocities of the slides are in world axes.
-            # The velocity of the ball joint is in the base's own axes.
+            # The base moves on three slide joints and a ball joint. The velocities of the slide joints are in
+            # world axes. The velocity of the ball joint is in the base's own axes.
             at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
@@ -376,7 +377,10 @@ class MujocoOracle(Oracle):
         return S_rate
 
     def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
-        """Return the rotation (n, slides, slides) from a joint's own axes to the axes of its slides."""
+        """Return the rotation of a floating or planar joint, and the number of its slide joints.
+
+        The rotation is an array (n, 3, 3) for a floating joint and (n, 2, 2) for a planar joint.
+        """
         own = q[:, place.q : place.q + 7]
         if place.kind == "floating":
             unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)

@@ -1,9 +1,9 @@
-"""Define the base class of the oracles, the query that its methods take, and the conversion of arguments.
+"""Base class of the oracles (Pinocchio and MuJoCo), and conversion of a call's arguments for an oracle.
 
-urdfkin converts the arguments of a call for its own computation. This module converts the arguments a second
-time for the oracle, from the URDF text, the oracle's model and the user's numbers. Apart from the exceptions
-below, the two conversions share no code. A wrong broadcast, order or name in one of them therefore leads to a
-disagreement.
+An oracle is a library whose results urdfkin compares with its own results. urdfkin converts the arguments of
+a call for its own computation. This module converts the same arguments a second time, for the oracle. Apart
+from the exceptions below, the two conversions share no code. A wrong broadcast, order or name in one of them
+therefore leads to a disagreement.
 
 | Part | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -14,8 +14,8 @@ disagreement.
 | moving base | `free_flyer` and others | `BaseMotion` |
 
 This module looks up names in the list of joints. The oracle compares the order of this list with the order of
-joints in the oracle's model. The only exceptions are the values of named poses and the parser of units
-(`urdfkin.errors.numbers`), which both conversions use.
+joints in the oracle's model. There are two exceptions. Both conversions parse units with
+`urdfkin.errors.numbers`, and both use the same values of named poses.
 
 Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so this module reads the
 rules. The module parses the text again at the first check.
@@ -102,7 +102,7 @@ def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> M
 
 
 def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
-    """Return the value of each locked joint, and the value of each mimic joint that a locked joint moves.
+    """Return the values of the locked joints and of all joints that mimic a locked joint.
 
     >>> locked_by_rules({"a": 2.0}, {"b": Mimic("a", 0.5, 0.25), "c": Mimic("d", 1.0, 0.0)})
     {'a': 2.0, 'b': 1.25}
@@ -121,7 +121,11 @@ _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _Place(NamedTuple):
-    """(nq, nv) of a joint in Pinocchio, its first indices in Pinocchio and urdfkin, and its mimic rule."""
+    """The first indices of a joint's coordinates and joint velocities, and the joint's mimic rule.
+
+    The indices are for Pinocchio (`full_q`, `full_v`) and for urdfkin (`q`, `v`). `sizes` is the joint's (nq,
+    nv) in Pinocchio.
+    """
 
     sizes: tuple[int, int]
     full_q: int
@@ -252,8 +256,8 @@ class Frames:
         robot: Name of the robot, for errors.
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
-        carriers: For the frame of each child link: the index of the frame of its parent joint. A link's frame
-            without an entry is also the frame of the parent joint.
+        carriers: For the index of a child link's frame: the index of its parent joint's frame. If a link's
+            frame is not in `carriers`, the frame of its parent joint has the same index.
     """
 
     def __init__(
@@ -317,7 +321,10 @@ def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
 
 
 class BaseNumbers(Protocol):
-    """Motion of the base in the user's numbers. Each array has at most one leading batch axis."""
+    """Placement, velocity and acceleration of the base, as the user gave them.
+
+    Each array has at most one leading batch axis.
+    """
 
     @property
     def placement(self) -> FloatArray:
@@ -376,7 +383,8 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     """Return R^T times the linear half and R^T times the angular half of a six-vector.
 
-    For a quaternion (u, w), each half x becomes x + 2 w (x x u) + 2 (x x u) x u.
+    The rotation is given by a quaternion with the vector part u and the scalar part w. Let y be the linear or
+    the angular half, and let c be the cross product of y and u. Then R^T y is y + 2 w c + 2 (c x u).
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     x = six.reshape(*six.shape[:-1], 2, 3)
@@ -388,7 +396,8 @@ def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 #: Largest number of names that an error lists.
 _NAMED = 5
 
-#: Suffixes of the names of coordinates and joint velocities, by the number of joint velocities of a joint.
+#: Names of a joint's coordinates and of its joint velocities. The key is nv of the joint: 3 for a planar
+#: joint, 6 for a floating joint.
 _OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 _OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
@@ -672,7 +681,10 @@ class Oracle:
 
     @property
     def data(self) -> Any:
-        """The library's data structure of this thread."""
+        """The data structure of Pinocchio or MuJoCo for this robot.
+
+        Each thread has its own data structure.
+        """
         if not hasattr(self._local, "data"):
             self._local.data = self.new_data()
         return self._local.data
@@ -731,7 +743,8 @@ def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray
         full: (..., Pinocchio's nv) columns for all joints.
         columns: Indices of the columns of J_full to add, in the order of the additions.
         index: (Pinocchio's nv,) index in v for each column of J_full.
-        factor: (Pinocchio's nv,) the number in G by which each column of J_full is multiplied.
+        factor: (Pinocchio's nv,) number by which each column of J_full is multiplied. These numbers are the
+            nonzero elements of G.
         nv: Length of v.
 
     Returns:

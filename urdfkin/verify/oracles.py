@@ -30,7 +30,8 @@ class OracleLibrary:
         version: Function that returns the installed version without importing the library.
         oracle: Function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the oracle's
             model of a robot.
-        size: Function that adapts the magnitudes of the bound to this oracle (`urdfkin.verify.bounds`).
+        size: Function that returns the `Magnitudes` for error bounds of this oracle
+            (`urdfkin.verify.bounds`). Its argument is the `Magnitudes` for Pinocchio.
     """
 
     name: OracleName

@@ -141,15 +141,16 @@ def build_model(
 ) -> Any:
     """Return Pinocchio's model of a URDF text.
 
-    Robots that would exhaust memory or stack, and so crash the process, are rejected or get a larger stack.
+    A robot that needs too much memory is rejected. A robot with a long chain of links is parsed with a larger
+    stack. Otherwise such robots would crash the process.
 
     Args:
         text: The URDF text.
         tree: urdfkin's tree of the text, which gives the size of the robot.
         root_joint: "floating" or "planar" to connect the root to the world by such a joint.
-        mimic: True: the model couples its mimic joints.
-        lock: Value (rad or m) of each locked joint. `buildReducedModel` removes these joints from the model
-            of the whole text.
+        mimic: True: the mimic joints move by their mimic rules. False: they are independent joints.
+        lock: Value (rad or m) of each locked joint. Pinocchio's `buildReducedModel` removes the locked joints
+            from the model.
         coupled: Whether a locked joint locks its mimic joints too.
 
     Raises:
@@ -182,8 +183,9 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
             raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
         at, numbers = model.joints[i].idx_q, model.joints[i].nq  # 0 for a mimic joint of a coupled model
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` looks frames up by name alone, but a link may have the name of a joint.
-    # A prefix that XML forbids makes the names of the links different from the names of joints.
+    # `buildReducedModel` finds frames by their names only, but a link may have the same name as a joint. The
+    # names of the links therefore have a prefix for a short time. No name in an XML text can contain this
+    # prefix.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_MARK + frame.name

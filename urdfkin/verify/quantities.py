@@ -1,8 +1,7 @@
 """The table of quantities: names, shapes, functions for computation and checks, bounds and help texts.
 
-Many parts of urdfkin use this table: methods of `Robot`, checks, validation, the accuracy study, plots,
-reports, replay lines and the command line. A new quantity is a row here, plus the functions that the row
-names and a page in docs.
+Many parts of urdfkin use this table, for example the methods of `Robot`, the checks, reports and the command
+line. For a new quantity, add a row to this table, the functions that the row names, and a page in docs.
 
 Functions are given by name and imported at first use, so that `--help` does not import NumPy.
 
@@ -65,17 +64,17 @@ class Quantity:
         equations: Equations of the textbook.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
             `recursive` is False, a method of `Robot` calls the function with other arguments.
-        ask: Function (oracle, query) that returns the oracle's (n, frames, ...).
+        ask: Function (oracle, query) that returns the oracle's results, (n, frames, ...).
         blocks: Function (oracle, query) that yields the oracle's results in blocks of configurations, for
             large results.
-        scale: Function (plan, magnitudes, reference) that returns the size of the terms of the quantity
+        scale: Function (plan, magnitudes, reference) that returns the scale of the quantity's bound
             (`urdfkin.verify.bounds`).
-        factors: Number of rotated vectors in a term of the quantity, in LOCAL_WORLD_ALIGNED
-            (`urdfkin.verify.bounds`).
-        against: Function (oracle, part, ours, by) that returns the oracle's results and the bound, for
-            quantities that need more than `ask` and `scale`.
-        exact: Function (motion, link, reference) that returns exact values, for the accuracy study and for
-            enclosures.
+        factors: Number of factors for the bound of the quantity in LOCAL_WORLD_ALIGNED; see the table in
+            `urdfkin.verify.bounds`.
+        against: Function (oracle, part, ours, by) that returns the oracle's results and the bound. If it is
+            given, `ask` and `scale` are not used for the check.
+        exact: Function (motion, link, reference) that returns intervals with the true values. The accuracy
+            study and `Robot.enclose` use it.
         recursive: True if the forward recursion computes the quantity for any frames.
         validated: True if `validate`, the accuracy study and plots include the quantity. A Hessian is left
             out: it has nv times as many numbers as a Jacobian, and consists of products of the Jacobian's
@@ -372,7 +371,10 @@ def compared() -> str:
 
 
 def not_compared() -> str:
-    """Return the names of the quantities that a validation does not compare; each call checks these."""
+    """Return the names of the quantities that a validation does not compare.
+
+    A method of `Robot` that computes such a quantity checks each result.
+    """
     return _listed(
         [row.title for row in QUANTITIES.values() if row.of == "frames" and row not in validated()]
     )
@@ -383,7 +385,7 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def by_command() -> dict[str, Quantity]:
-    """Return the quantities that have a command of their own, by the name of the command."""
+    """Return the quantities that a command of the command line computes, by the name of the command."""
     return {row.command: row for row in recursive_quantities() if row.command}
 
 

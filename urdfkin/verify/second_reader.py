@@ -48,7 +48,7 @@ _AXIS = 5.0 * EPS
 _UNIT = 1e-6
 #: Largest number of differences, or of joints with a known fault, in a report.
 _LISTED = 8
-#: Longest reason why yourdfpy cannot read a text, in characters.
+#: Largest number of characters that a report quotes from an error of yourdfpy.
 _QUOTED = 200
 #: Kinds of joints with position limits. The specification ignores position limits of other kinds.
 _BOUNDED = ("revolute", "prismatic")
@@ -214,7 +214,7 @@ def _quaternions(text: str) -> set[str]:
 
 
 def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    """Yield the names that only one reader has, and the names that a reader has twice."""
+    """Yield a line of text for each name that the two readers find with different frequency."""
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:

@@ -1,14 +1,14 @@
-"""Explain a singular Jacobian by its rank, the lost directions, and the joints that cause the loss of rank.
+"""Explain a singular Jacobian: its rank, the lost directions, and the joints that cause the loss of rank.
 
 A left null vector u of J is a lost direction. The frame cannot move along u, because u^T J v = 0 for every v.
-A right null vector is a null motion, which consists of joint velocities that do not move the frame. A
-smallest dependent set is a set of linearly dependent columns of which each proper subset is independent. Such
-a set shows which joints cause the loss of rank. A geometric reason, such as parallel axes, is stated only if
-the columns satisfy its condition within the error bound of J.
+A right null vector is a null motion, which consists of joint velocities that do not move the frame. A minimal
+dependent set is a set of columns that are linearly dependent. If any column is removed, the remaining columns
+are independent. Such a set shows which joints cause the loss of rank. A geometric reason, such as parallel
+axes, is stated only if the columns satisfy its condition within the error bound of J.
 
-A column of a revolute joint is [a x z; z], where z is the axis and a leads from the frame's origin to a point
-of the axis. Therefore, two joint axes are collinear if their columns are equal up to sign. An axis passes
-through the frame's origin if the linear rows of its column are 0.
+The column of a revolute joint is [a x z; z]. Here z is the direction of the axis, and the vector a leads from
+the frame's origin to a point of the axis. Therefore, two joint axes are collinear if their columns are equal
+up to sign. An axis passes through the frame's origin if the linear rows of its column are 0.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 _LARGEST_SET, _MOST_COLUMNS = 4, 16
 #: Rounding error of the singular value decomposition of a small matrix, in eps for each row or column.
 _ROUNDINGS = 16.0
-#: At random configurations, a singular value below this fraction of the Jacobian's size counts as 0.
+#: At random configurations, a singular value below this fraction of the Jacobian's norm is treated as 0.
 _USUAL = 1e-9
 
 
@@ -193,8 +193,8 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # An arm with fewer joints than the Jacobian's rows has lost directions in every configuration.
-        # These directions depend on the configuration.
+        # If an arm has fewer joints than the Jacobian has rows, the frame cannot move in some directions in
+        # any configuration. These directions depend on the configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -255,7 +255,7 @@ class _Explanation:
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
     def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield the smallest dependent sets of columns.
+        """Yield the minimal dependent sets of columns.
 
         Each set consists of indices into the columns of the joints that move the frame.
         """
@@ -273,9 +273,10 @@ class _Explanation:
                     yield one
 
     def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        """Join pairs of dependent columns that have a column in common.
+        """Replace overlapping pairs of dependent columns by their union.
 
-        For example, each pair of columns of three parallel prismatic joints is dependent.
+        For example, any two columns of three parallel prismatic joints are a dependent pair. The three pairs
+        are replaced by one set of three columns.
         """
         joined: list[set[int]] = []
         if self._linear_only:
@@ -322,9 +323,10 @@ class _Explanation:
         return None
 
     def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
-        """Return the geometric reason why the revolute axes of a smallest dependent set are dependent.
+        """Return the geometric reason why the columns of several revolute joints are linearly dependent.
 
-        If the reason is unknown, the result is None.
+        The reason is, for example, that the axes are collinear. If no known reason applies, the result is
+        None.
         """
         indices = self._moving[list(one)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T

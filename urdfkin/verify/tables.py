@@ -14,14 +14,14 @@ equations a second time. The check would not be independent if it used `urdfkin.
 computes the table's results. The bound is the sum of the rounding errors of urdfkin and of Pinocchio, plus
 the deviation that a snapped table declares.
 
-The scale of rounding is the robot's size: the path lengths from the root to the table's base and to its tip,
-with prismatic displacements. Columns of the Jacobian are scaled by the mimic multipliers. The scale also
-includes the table's own lengths, but at most `PROMISED` times the robot's reach. Lengths in tables with
-Hayati rows never exceed that limit.
+The bound on rounding errors is proportional to the robot's reach. Here the reach is the length of the paths
+from the root to the table's base and to its tip, with prismatic displacements. If the sum of the table's own
+lengths is larger, this sum is used, but at most `PROMISED` times the reach. Lengths in tables with Hayati
+rows never exceed that limit. The bound on a Jacobian column is multiplied by the mimic multipliers.
 
-A row has only four parameters, so nearly parallel axes may need lengths of kilometres. When two such lengths
-cancel, the error is eps times their size. A difference within that error is not a disagreement, but the table
-loses digits. `TableCheck.loss` then states this loss.
+A row has only four parameters, so nearly parallel axes may need lengths of kilometres. If two such lengths
+cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference that is within this
+error. Such a table is less accurate, and `TableCheck.loss` states the error.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ PROMISED = 10.0
 
 
 class TableError(UrdfkinError):
-    """A table and Pinocchio disagree by more than rounding and snapping can explain.
+    """A table and Pinocchio differ by more than rounding errors and the changes by `--snap` allow.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.TableError, urdfkin.UrdfkinError)
@@ -69,9 +69,10 @@ class TableCheck:
         radians: Angle between the orientations of these two tips, rad.
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
         shares: The same differences divided by their bounds; at most 1 if the table agrees.
-        snapped: True if the bound includes the declared deviation of snapping.
-        loss: Explanation of the lost digits, if the difference exceeds the bound because of very large
-            lengths; None otherwise.
+        snapped: True if the table was changed by snapping, for example from an angle of 89.99 to 90 degrees.
+            The bound then includes the deviation that the table declares.
+        loss: Explanation, if very large lengths in the table are the reason why a difference exceeds its
+            bound; else None.
     """
 
     samples: int
@@ -244,18 +245,17 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """Scales of the rounding.
+    """Sizes of the robot and of its motion, to which the bounds on rounding errors are proportional.
 
     Attributes:
         reach: (n,) sum of the path lengths from the root to the table's base and to its tip, m.
-        turning: (columns,) for each coordinate: the sum of |multiplier| over the revolute joints that it
-            moves on these paths.
-        sliding: (columns,) for each coordinate: the sum of |multiplier| over the prismatic joints that it
-            moves on these paths.
+        turning: (columns,) for each coordinate: the sum of |multiplier| over revolute joints. The sum
+            includes the coordinate's joint and its mimic joints, if they are on one of these paths.
+        sliding: (columns,) the same sums over prismatic joints.
         rates: (n,) sum of all |joint velocity|, rad/s and m/s.
         accelerations: (n,) sum of all |joint acceleration|, rad/s^2 and m/s^2.
-        rounding: (n,) eps times the number of roundings (joints, rows and angles), plus the tilts that a
-            table omits (`urdfkin.dh.common_normals`).
+        rounding: (n,) upper bound on the relative rounding error. The bound also contains the angles between
+            nearly parallel axes that the table treats as parallel (`urdfkin.dh.common_normals`).
     """
 
     reach: FloatArray
@@ -266,12 +266,16 @@ class Sizes:
     rounding: FloatArray
 
     def of_length(self, metres: float) -> Sizes:
-        """Return the scales for a table whose lengths have the sum `metres`."""
+        """Return the same sizes with a reach of at least `metres`."""
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
 def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
-    """Return the scales for the paths from the root to base and tip, because Pinocchio starts at the root."""
+    """Return the sizes that the bounds need.
+
+    They are for the paths from the root to base and tip, because Pinocchio computes both frames from the
+    root.
+    """
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
     names, joints, tilt = table.joint_names, 0, 0.0
@@ -297,19 +301,21 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # Rounding errors come from Pinocchio's joints, the joints of the chain, and the rows of the table.
-    # A tilt rotates four factors of the acceleration relative to the base.
+    # Rounding errors come from Pinocchio's joints, the joints of the chain, and the rows of the table. A term
+    # of the relative acceleration is a product with up to four rotated vectors. `Joint.tilt`, the angle
+    # between a joint's axes in urdfkin and in Pinocchio, changes each of these vectors.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 
 class _Slack:
-    """Allowed difference of a snapped table beyond rounding.
+    """Allowed differences between a snapped table and the robot, in addition to rounding errors.
 
     Snapping rotates an axis by at most `turn` and displaces a joint origin or the tip by at most `metres`.
     Therefore z x d changes by at most `turn` times the reach plus twice `metres`. A product of two such
-    factors changes by at most twice this amount. Angular terms z x z change by at most twice `turn`.
+    factors changes by at most twice this amount. The cross product of two axes changes by at most twice
+    `turn`.
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:

@@ -3,13 +3,14 @@
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
 the conversion from the stage to the tree. Therefore `load` makes two comparisons:
 
-- with OpenUSD's own parser of UsdPhysics: the bodies, frames, degrees of freedom and limits of each joint. A
-  difference is an error.
-- with the transforms of the prims, by UsdGeom: the stage shows the robot in one configuration. In this
-  configuration, each link must have the placement of its prim. The file states these transforms separately
-  from the joint frames, so a difference is a warning about the file.
+- with OpenUSD's own parser of UsdPhysics. The bodies, frames, degrees of freedom and limits of each joint
+  must be the same. A difference is an error.
+- with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
+  robot in one configuration. In this configuration, each link must have the placement of its prim. The file
+  states these transforms separately from the joint frames, so a difference is a warning about the file.
 
-Both comparisons allow only for rounding to single precision, in which a stage stores its numbers.
+Both comparisons allow only differences due to rounding, because a stage stores its numbers in single
+precision.
 """
 
 from __future__ import annotations
@@ -51,15 +52,17 @@ from urdfkin.verify.verifier import Verifier
 PATIENCE = 60.0
 #: Largest accepted size of the process's output, bytes.
 _MOST = 400_000_000
-#: Bound on the angle error of a joint's rotation in OpenUSD's parser, in roundings to single precision.
-#: Rounding the four numbers of a quaternion changes its angle by at most 2 roundings.
-#: The product of two quaternions adds 4 roundings to each of the four numbers.
-#: The error vector of the four numbers then has length 8, which is an error of 16 in the angle.
+#: Bound on the angle error (rad) of a joint's rotation in OpenUSD's parser, divided by `SINGLE`. `SINGLE` is
+#: the relative error of one rounding to single precision. Rounding the four numbers of a quaternion changes
+#: its angle by at most 2 `SINGLE`. The product of two quaternions adds an error of 4 `SINGLE` to each of the
+#: four numbers. These four errors form a vector of length 8 `SINGLE`. The angle error is twice this length:
+#: 16 `SINGLE`.
 _ROTATION = 18.0
-#: Number of roundings of a joint's origin: the scale, the product with the scale, and the transformed origin.
+#: Number of roundings in the computation of a joint's origin. The scale factor, its product with the origin,
+#: and the transformed origin are rounded.
 _ORIGIN = 3.0
-#: Bound on the angle error of a prim's rotation, in roundings to single precision.
-#: The rotation has three angles, and each angle is at most one turn (2 pi).
+#: Bound on the angle error (rad) of a prim's rotation, divided by `SINGLE`. The rotation has three angles,
+#: and each angle is at most one turn (2 pi).
 _TRANSFORM = 6.0 * np.pi
 
 
@@ -197,19 +200,21 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint name: bounds on rounding errors and two lengths (see `urdfkin.urdf.usd.Usd.single`).
+#: For each joint name: five numbers for the effect of rounding to single precision (see
+#: `urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SinglePrecision:
-    """How far rounding to single precision can change the links and the joints of a robot.
+    """Bounds on the effect of rounding to single precision on the links and the joints of a robot.
 
     Attributes:
-        links: (links, 2) how far it can move (m) and turn (rad) each link, over all configurations.
-        joints: (joints, 3) how far it can move (m) and turn (rad) the frame after each joint in the zero
-            configuration, seen from the frame before it; and the share of its value by which it can change
-            each number of the joint's mimic rule.
+        links: (links, 2) largest position error (m) and angle error (rad) of each link, over all
+            configurations.
+        joints: (joints, 3) for each joint in the zero configuration: largest position error (m) and angle
+            error (rad) of the next frame relative to the previous frame. The third number is the relative
+            error of the numbers in the joint's mimic rule.
     """
 
     links: FloatArray
@@ -217,26 +222,29 @@ class SinglePrecision:
 
 
 def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
-    """Return how far single precision can move and turn each link and the frame after each joint.
+    """Return the largest errors of links and joints that result from rounding to single precision.
 
     The numbers of a stage are rounded to single precision. The error of a stored number is at most half of
-    the distance to the next number in single precision; a zero is exact. The three errors of an origin's
-    numbers form a vector, whose length is the error of the origin. The four errors of a unit quaternion form
-    a vector, and the angle error is twice the length of this vector. An angle error moves each later link by
-    at most the angle times the length of the path to this link. The error of a mimic rule m q + c is 2^-24
-    (|m q| + |c|), for the largest |q| within the limits.
+    the distance to the next number in single precision. The number 0 has no error. The three errors of an
+    origin's numbers form a vector, whose length is the error of the origin. The four errors of a unit
+    quaternion form a vector, and the angle error is twice the length of this vector. An angle error moves
+    each later link by at most the angle times the length of the path to this link. The error of a mimic rule
+    m q + c is 2^-24 (|m q| + |c|), for the largest |q| within the limits.
 
-    In the zero configuration a joint of the tree places the next frame at A B^-1, the joint's frame A in one
-    body and B in the other. Let w be the sum of the errors of both origins, and e the sum of the errors of
-    both rotations. The rotation is off by at most e. The place is off by at most w + e |p|, with the origin p
-    of B. A revolute joint of the tree has no such term: the reader writes B as a fixed joint of its own if
-    its origin is not zero. That fixed joint has no entry, because the entry of the revolute joint counts both
-    frames. For other joints, the last number of the entry is |p|. In a locked joint the two frames are
-    apart by the value q too, and |q| is at most the length of the constant plus that of the two origins.
+    A stage states the pose A of a joint's frame in one body and its pose B in the other body. In the zero
+    configuration, the pose of the next frame is A B^-1. Let p be the origin of B. Let w be the sum of the
+    position errors of A and B, and let e be the sum of their angle errors. The angle error of A B^-1 is at
+    most e. Its position error is at most w + e |p|. For a revolute joint, the term e |p| is 0. If p is not
+    zero, urdfkin writes B as a separate fixed joint after the revolute joint. That fixed joint is not in
+    `single`, because the numbers of the revolute joint include the errors of B. For other joints, the last
+    number in `single` is |p|. A locked prismatic joint also displaces the next frame by its value q. The
+    absolute value of q is at most the length of the joint's constant offset plus the lengths of the two
+    origins.
 
     Args:
         tree: The robot.
-        single: The errors of each joint. A joint without an entry is exact.
+        single: Five numbers for each joint. The numbers of a joint that is not in `single` have no rounding
+            error.
     """
     out, own = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):

@@ -65,7 +65,7 @@ _MOST = 4096
 
 
 class NotVerifiedWarning(UserWarning):
-    """The oracle could not check some results; the message gives the reason.
+    """The oracle could not check some results. The message gives the reason.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.NotVerifiedWarning, UserWarning)
@@ -79,7 +79,8 @@ class Verifier:
     Args:
         text: The URDF text that Pinocchio reads.
         tree: urdfkin's tree of the same text.
-        origin: Source of the text, for lines that reproduce a case.
+        origin: The arguments of `load`. Error messages contain a command that loads the robot with these
+            arguments and repeats a failed computation.
         policy: Default of `verify` in calls.
         mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
         unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
@@ -88,7 +89,8 @@ class Verifier:
 
     Attributes:
         ledger: Record of checked and unchecked results.
-        reading: Result of the check of a conversion from another format to the text; empty for a URDF.
+        reading: If the text was converted from another format, the result of the check of this conversion.
+            Empty for a URDF.
     """
 
     def __init__(
@@ -110,8 +112,8 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Pinocchio's models are rebuilt when needed.
-        # A copy of a verifier has not yet returned results, so the ledger of the copy is empty.
+        # Pinocchio's models are rebuilt when needed. A copy of a verifier has not yet checked any results, so
+        # the copy begins with an empty record.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
@@ -219,7 +221,9 @@ class Verifier:
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check the results of a call in their final shape, and record them.
+        """Check the results of a call, and record the check.
+
+        The results have the shape in which the call returns them.
 
         Raises:
             VerificationError: the oracle's result differs by more than the bound.
@@ -254,10 +258,10 @@ class Verifier:
         frame: str,
         reference: Reference,
     ) -> Callable[..., FloatArray | None]:
-        """Return a function that calls `compute`, checks its result as `check` does, and records the check.
+        """Return a function that calls `compute` and checks its result. The function also records the check.
 
-        The new function returns None if `compute` returns None, and always if the oracle cannot check the
-        robot.
+        The function returns None if `compute` returns None. If the oracle cannot check the robot, the
+        function always returns None.
 
         Args:
             name: Name of a quantity.
@@ -346,7 +350,7 @@ class Verifier:
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table with Pinocchio.
 
-        Warn if a strict table loses digits because of very large lengths.
+        Warn if very large lengths in the table cause rounding errors above the usual bound.
 
         Returns:
             The result; None, with a warning, if Pinocchio cannot check the robot.
@@ -418,7 +422,7 @@ def comparison_with_oracle(
     Large results are compared in blocks, while the oracle's results are still in the cache.
 
     Raises:
-        OracleError: the oracle returns results for more or fewer configurations.
+        OracleError: the number of the oracle's results differs from the number of configurations.
     """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
@@ -523,8 +527,8 @@ def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
         numbers: Number of values in the results of one configuration.
 
     Yields:
-        Slices or arrays of indices. A sample is random with a fixed seed. A regular choice could be biased,
-        because batches are often ordered.
+        Slices or arrays of indices. A sample is random with a fixed seed. Every k-th configuration could be a
+        biased sample, because batches are often ordered.
     """
     step = min(_MOST, max(1, _AT_A_TIME // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

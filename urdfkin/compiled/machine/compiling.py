@@ -8,8 +8,8 @@ folder is writable, nothing is cached.
 
 Parts. A *part* is a function that only kernels call, never Python. The compiler inlines a part into each
 kernel that calls it. A part therefore needs no machine code of its own, and no optimization before it is
-inlined. Parts have no closures, no `with`, no literal loops and no array expressions, and need no inlining by
-Numba. The compiler passes for these features are therefore skipped. Skipping all these steps halves the
+inlined. The source code of parts uses only some features of Python. Compiler passes for other features are
+skipped, for example the passes for closures and for array expressions. Skipping all these steps halves the
 compile time.
 """
 
@@ -100,7 +100,7 @@ class _Part(_Library):  # type: ignore[misc]
     """
 
     def finalize(self) -> None:
-        """Complete the library without generating machine code for it."""
+        """Mark the library as finished without generating machine code."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -119,7 +119,8 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
         state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba registers a function by the pointer that Python calls. A part has no such pointer.
+        # Numba identifies a compiled function by the C pointer through which Python calls it. A part has no
+        # such pointer.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -128,10 +129,10 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
 
 
 class PartCompiler(_Compiler):  # type: ignore[misc]
-    """The compiler passes of Numba that a part needs."""
+    """A compiler that runs only the passes of Numba that the parts of kernels need."""
 
     def define_pipelines(self) -> list[Any]:
-        """Return a list with the only pipeline of compiler passes."""
+        """Return a list that contains one pipeline of compiler passes."""
         passes = _Passes("part")
         for each in (
             untyped_passes.TranslateByteCode,
@@ -183,9 +184,9 @@ def compiling_allowed() -> Iterator[None]:
 def _skip_blas_check() -> None:
     """Prevent Numba from importing SciPy's linear algebra for a check.
 
-    The import takes a fifth of the running time of a command. No kernel calls linear algebra. Other compiled
-    code that calls linear algebra still imports and checks it. If a version of Numba makes this check in a
-    different function, `_skip_blas_check` has no effect.
+    The import takes a fifth of the running time of a command. No kernel calls linear algebra. Numba still
+    imports and checks SciPy's linear algebra for other compiled functions that call it. If a version of Numba
+    makes this check in a different function, `_skip_blas_check` has no effect.
     """
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
         return

@@ -3,8 +3,8 @@
 Each compiled function takes the address of its arguments.
 
 For a batch, a kernel computes eight configurations at a time, one in each of the eight lanes of a vector
-register. For a single configuration, the same kernel computes the same numbers in all eight lanes. The result
-of a configuration therefore has the same bits alone and at every position of a batch.
+register. For a single configuration, the same kernel computes the same numbers in all eight lanes. A
+configuration therefore has exactly the same result in a batch as in a call with only this configuration.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ def _in_row(builder: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number(context: Any, s: Any, row: Any) -> Any:
-    """Return the number in a row of scratch memory."""
+    """Return the eight doubles of a row of scratch memory as one vector."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.load(_in_row(builder, *arguments), align=64)
@@ -46,9 +46,9 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the number in a row of scratch memory if it is needed.
+    """Return the eight doubles of a row of scratch memory, or `nothing()` if `wanted` is `nothing()`.
 
-    If `wanted` is the unused number `nothing()` of the module `numbers`, return `nothing()`.
+    The object `nothing()` of the module `numbers` stands for a number that is not needed.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -61,9 +61,10 @@ def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def put(context: Any, s: Any, row: Any, x: Any) -> Any:
-    """Write a number to a row of scratch memory.
+    """Write the eight doubles of x to a row of scratch memory.
 
-    If x is the unused number `nothing()` of the module `numbers`, the row is not changed.
+    If x is `nothing()`, the row is not changed. The object `nothing()` of the module `numbers` stands for a
+    number that is not needed.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -146,9 +147,10 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose eight vectors, which contain square blocks of numbers side by side.
+    """Transpose each square block of numbers in the matrix whose rows are the given vectors.
 
-    The function makes one step for each of w = 1, 2 and 4. In each block of 2w by 2w numbers, the step
+    For example, four vectors of eight numbers contain two blocks of 4 by 4 numbers. The function has one step
+    for each w = 1, 2 and 4 that is below the number of vectors. In each block of 2w by 2w numbers, the step
     exchanges the upper right and the lower left block of w by w numbers.
     """
     x, w = list(vectors), 1
@@ -231,9 +233,8 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 def read_rows(m, x, at, stride, count, s, row):
     """Read `count` numbers of each of eight configurations into rows of scratch memory.
 
-    The numbers of the first configuration begin at `x[at]`. The numbers of each next configuration begin
-    `stride` numbers later. If `m` is 1, only the first configuration is read, and its numbers are used for
-    all eight.
+    The numbers of configuration k begin at `x[at + k * stride]`. If `m` is 1, only the first configuration is
+    read, and its numbers are used for all eight.
     """
     i = 0
     if m == 1:
@@ -311,7 +312,7 @@ _AHEAD = 512
 
 @intrinsic
 def _eight(context: Any, x: Any, at: Any) -> Any:
-    """Return eight consecutive numbers, one in each lane."""
+    """Return the eight consecutive numbers from `x[at]` on as one vector."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, at = arguments

@@ -1,16 +1,15 @@
-"""Number types for compiled code; a number consists of one double or of several doubles.
+"""Number types for compiled code: a value of such a type is one double or a vector of doubles.
 
-A number of type `Lanes(8)` is eight doubles in one vector register; `Lanes(1)` is one double. `Lanes(8)` and
-`Lanes(1)` are Numba types that use LLVM's vectors, so a number stays in a register from one equation to the
-next. A product is kept as its two factors until it is added. The sum x y + z is then one fused multiply-add,
-which is rounded once. This module, and not the compiler, decides which operations are fused. Results
-therefore have the same bits for one lane and for eight lanes, on every machine.
+A value of type `Lanes(8)` is eight doubles in one vector register. A value of type `Lanes(1)` is one double.
+`Lanes(8)` and `Lanes(1)` are Numba types that use LLVM's vectors, so a value stays in a register from one
+equation to the next. A product is kept as its two factors until it is added. The sum x y + z is then one
+fused multiply-add, which is rounded once. This module, and not the compiler, decides which operations are
+fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
 sum with zero, costs no time. If z = (0, 0, 1) is written with these numbers, the equations for any axis
-simplify to the equations for the axis z. A rotation about x then does not compute the x component.
-`nothing()` stands for a number that is not needed. A result that is computed from it is also `nothing()` and
-costs no time.
+simplify to the equations for the axis z. `nothing()` stands for a number that is not needed. A result
+computed from `nothing()` is also `nothing()` and costs no time.
 """
 
 from __future__ import annotations
@@ -31,14 +30,17 @@ _DOUBLE = ir.DoubleType()
 
 
 class Lanes(types.Type):
-    """The type of a number that consists of several doubles in one vector."""
+    """The type of a vector of `width` doubles."""
 
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Lanes({width})")
 
     def can_convert_from(self, context: Any, other: Any) -> Any:
-        """Return the conversion from another type to this type, if any; a product can be converted."""
+        """Return Numba's code for the conversion from another type to this type, or None.
+
+        Only a `Product` of the same width can be converted.
+        """
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
@@ -47,7 +49,7 @@ class Lanes(types.Type):
 
 
 class Product(types.Type):
-    """The type of a product that is not multiplied yet: it is stored as its two factors."""
+    """The type of a product that is stored as its two factors."""
 
     def __init__(self, width: int) -> None:
         self.width = width
@@ -91,7 +93,7 @@ class _KnownModel(models.OpaqueModel):
 
 
 class _Value:
-    """A number during compilation, which consists of a type and an LLVM value."""
+    """A number in code that is being compiled: its Numba type and its LLVM value."""
 
     def __init__(self, context: Any, builder: Any, type_: Any, value: Any) -> None:
         self.context, self.builder, self.type = context, builder, type_
@@ -106,7 +108,7 @@ class _Value:
         return pair.x, pair.y
 
     def number(self, width: int) -> Any:
-        """Return the number as an LLVM vector; a product is multiplied and rounded."""
+        """Return the number as an LLVM vector. The factors of a `Product` are multiplied."""
         if self.is_product:
             return self.builder.fmul(*self.factors())
         if isinstance(self.type, Known):
@@ -117,7 +119,7 @@ class _Value:
 
 
 def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
-    """Return an LLVM vector that contains the same double in every lane."""
+    """Return an LLVM vector of `width` copies of a double."""
     empty = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
     first = builder.insert_element(empty, double, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)

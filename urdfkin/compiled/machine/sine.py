@@ -1,11 +1,12 @@
 """Sine and cosine of several angles at once, to 0.65 units in the last place.
 
-The angle is reduced to [-pi/4, pi/4] by Cody and Waite's method; the rounding error of the reduction is
-computed too. The polynomials come from fdlibm (Sun Microsystems, k_sin.c and k_cos.c). Below 2^20 quarter
-turns it is enough to represent pi/2 by two doubles, because the multiplications and additions are fused. Near
-a multiple of pi/2, the sine or the cosine is near 0, and this small value has an error of up to 1e-27. The
-sine and the cosine of a larger angle are computed by the C library. Only the lane with this angle uses the C
-library, because the result of a configuration must not depend on the other configurations.
+The angle is reduced to [-pi/4, pi/4] by Cody and Waite's method. The rounding error of the reduction is
+computed too. The polynomials come from fdlibm (Sun Microsystems, k_sin.c and k_cos.c). For angles below 2^20
+quarter turns, pi/2 is represented by the sum of two doubles. Two doubles are enough because the reduction
+uses fused multiply-adds. Near a multiple of pi/2, the sine or the cosine is near 0, and this small value has
+an error of up to 1e-27. The sine and the cosine of a larger angle are computed by the C library. Smaller
+angles in the same vector do not use the C library, because the result of a configuration must not depend on
+the other configurations.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _2_PI = 2.0 / math.pi
 def sine_cosine(s, row, x):
     """Return the sines and the cosines of angles.
 
-    `row` is the index of a row of scratch memory that may be overwritten.
+    The function may overwrite the scratch memory row with the index `row`.
     """
     sine, cosine = _of_small(x)
     if _any_large(x):
@@ -91,9 +92,9 @@ def _of_small(context: Any, x: Any) -> Any:
             sign = builder.shl(builder.and_(turns, bits(2)), bits(62))
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
-        # An odd number of quarter turns exchanges sine and cosine.
-        # Two or three quarter turns change the sign of the sine.
-        # One or two quarter turns change the sign of the cosine.
+        # An odd number of quarter turns exchanges sine and cosine. If the remainder of the quarter turns
+        # modulo 4 is 2 or 3, the sine changes its sign. If this remainder is 1 or 2, the cosine changes its
+        # sign.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             signed(builder.select(odd, cosine, sine), quarters),
@@ -106,7 +107,7 @@ def _of_small(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _any_large(context: Any, x: Any) -> Any:
-    """Return whether any lane contains an angle of 2^20 quarter turns or more, or nan."""
+    """Return whether an element of the vector x is nan, or an angle of at least 2^20 quarter turns."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -123,7 +124,7 @@ def _any_large(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _with_lane(context: Any, x: Any, lane: Any, value: Any) -> Any:
-    """Return a copy of the number x in which one lane contains the double `value` instead."""
+    """Return a copy of the vector x whose element with index `lane` is the double `value`."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, lane, value = arguments

@@ -2,13 +2,14 @@
 
 A call through Numba checks the type of each argument and unpacks every array, which takes as long as the
 recursion itself. CPython calls a built-in function without these checks: it passes the addresses of the
-arguments. The compiled function of this module is such a built-in function. It reads only a few words of each
-array object, at the offsets that CPython and NumPy guarantee to C code. The function holds Python's global
-interpreter lock for about a microsecond. For arguments that it does not support, the function returns None.
+arguments. The compiled function of this module is such a built-in function. It reads only a few 8-byte words
+of each array object, at the offsets that CPython and NumPy guarantee to C code. The function holds Python's
+global interpreter lock for about a microsecond. For arguments that it does not support, the function returns
+None.
 
 A call marks its scratch memory as busy in one atomic operation, which is also safe in a Python without a
-global interpreter lock. If another thread is using the scratch memory, the function also returns None, and
-the caller computes the result in another way.
+global interpreter lock. If another thread is using the scratch memory, the function also returns None. The
+caller then computes the result in another way.
 """
 
 from __future__ import annotations
@@ -42,10 +43,10 @@ _AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelA
 
 #: Number of words (of eight bytes) in the header of a Python object.
 _OWN = object.__basicsize__ // 8
-#: Indices of two words: an object's type, and a tuple's first item.
+#: Index of the 8-byte word with an object's type, and index of the word with a tuple's first item.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
-#: Indices of words in a NumPy array (the C structure PyArrayObject_fields).
-#: The number of axes and the flags occupy half a word each.
+#: Indices of 8-byte words in a NumPy array (the C structure PyArrayObject_fields). The number of axes and the
+#: flags are numbers of four bytes.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
 #: In the C structure PyArray_Descr (an element type), one word has the byte order and the type number.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
@@ -116,7 +117,8 @@ def one_configuration(bound, arguments, count):
     The arguments are q, or q and v, or q, v and a. The last argument is the output array, or None for a new
     array.
 
-    The function returns the result, or None if it does not support the arguments or if its memory is busy.
+    The function returns the result. It returns None if it does not support the arguments, or if another
+    thread is using the scratch memory.
 
     Args:
         bound: Address of a tuple. Its items are the kernel arguments, the array type, None, the function
@@ -183,7 +185,7 @@ _FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.
 def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
     """Return a Python function that runs the code at an address.
 
-    The function keeps the objects alive that are bound to it.
+    The objects `bound` are not deleted while the function exists.
     """
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
@@ -225,14 +227,14 @@ _HOW: dict[str, tuple[Core, Core, int, int]] = {
 def single(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return the fast function of a quantity for the only frame of a compiled tree, with a fixed base.
+    """Return a function that computes a quantity of a compiled tree's only frame for one configuration.
 
-    The function is compiled or read from disk.
+    The base must be fixed. The function is compiled or read from disk.
 
     Returns:
-        The function and its kernel arguments. The function takes (q, ..., out or None) and returns the
-        result, or None if it does not support the arguments. The kernel arguments also contain a count of the
-        results.
+        The function and its kernel arguments. The function takes (q, ..., out or None). It returns the
+        result, or None if it does not support the arguments. The kernel arguments also contain the number of
+        results so far.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
@@ -250,7 +252,7 @@ def single(
 def called(
     core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a fast function for one configuration, which calls a C function like a kernel.
+    """Return a function that computes one configuration with a C function instead of a kernel.
 
     Args:
         core: The C function, as a `ctypes` object.

@@ -114,7 +114,7 @@ class Enclosure:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosures:
-    """Enclosures of the motion of one frame.
+    """Intervals that contain the true placement, velocity, acceleration and Jacobians of a frame.
 
     Attributes:
         frame: Name of the frame.
@@ -160,7 +160,9 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """Return the enclosures of one frame for one sample. `Robot.enclose` explains most arguments.
+    """Return intervals that contain the true results of one frame for one sample.
+
+    `Robot.enclose` explains most arguments.
 
     Args:
         verifier: Verifier of the robot.
@@ -170,7 +172,7 @@ def enclose(
         reference: Reference frame.
         base: Motion of the root link; None: fixed at the world origin.
         digits: Decimal digits, or None for the default.
-        hessian: Whether to enclose the Hessian too.
+        hessian: Whether to compute the intervals of the Hessian too.
 
     Raises:
         InputError: a batch of inputs, a wrong length, or an invalid number of digits.

@@ -35,12 +35,13 @@ from urdfkin.verify.bounds import Conversion
 DIGITS = 50
 #: Twice the 15 decimal digits of a double.
 _TWO_DOUBLES = 30
-#: Number of bits for each decimal digit, and number of additional bits.
-#: Fifteen digits get 55 bits, two more than a double has.
-#: An interval with a midpoint of 53 bits can be four times as wide as an interval with ends of 53 bits.
+#: Number of bits for each decimal digit, and number of additional bits. Intervals are computed with a
+#: midpoint and a radius. With 53 bits for the midpoint, an interval can be four times as wide as an interval
+#: between two doubles. For 15 digits, which is the precision of a double, 55 bits are therefore used instead
+#: of 53.
 _BITS, _MORE_BITS = math.log2(10.0), 5
-#: First number: significant digits of a written decimal; 17 digits determine every double.
-#: Second number: digits of the decimal before it is rounded.
+#: Number of significant digits of a written decimal: 17 digits determine every double. `_ALL_DIGITS` is the
+#: number of digits with which `decimal` computes a decimal before it is rounded.
 _SIGNIFICANT, _ALL_DIGITS = 17, 200
 #: Additional bits of precision during iterations.
 _SPARE = 30
@@ -49,18 +50,19 @@ _ONE_THREAD = lock_over_forks()
 
 
 def enough_digits(joints: int) -> int:
-    """Return a number of digits with which intervals are narrower than the last digit of a double.
+    """Return a sufficient number of digits, so that intervals are narrower than the last digit of a double.
 
-    One digit is added for each joint before the frame. A joint with an oblique axis loses a third of a digit.
+    The number contains one digit for each joint before the frame. A joint with an oblique axis makes
+    intervals wider by a third of a digit.
     """
     return _TWO_DOUBLES + joints
 
 
 @contextmanager
 def precision(digits: int) -> Iterator[None]:
-    """Set the number of decimal digits of midpoints in a `with` block.
+    """Set the number of decimal digits of intervals in a `with` block.
 
-    15 digits equal the precision of a double.
+    With 15 digits, intervals have the precision of a double.
 
     Arb has one precision for the whole process. Therefore, only one thread at a time can be in such a block.
     """
@@ -117,10 +119,11 @@ def decimal(x: Number, negligible: float) -> str | None:
 
 
 class Kind(NamedTuple):
-    """A kind of number to read a URDF's decimals as.
+    """Functions for one type of number, for example intervals (`BALLS`).
 
     Attributes:
-        number: Function that reads a decimal, or the value of a locked joint.
+        number: Function that converts a decimal in the URDF text, or a locked joint's value (a double), to a
+            number.
         sine_cosine: Function that returns sine and cosine of an angle.
         root: Function that returns the square root.
     """
@@ -130,7 +133,7 @@ class Kind(NamedTuple):
     root: Callable[[Number], Number]
 
 
-#: Balls.
+#: The functions for Arb's intervals.
 BALLS = Kind(exact, lambda angle: exact(angle).sin_cos(), lambda x: exact(x).sqrt())
 
 
@@ -174,7 +177,8 @@ def nearest_rotation(M: Matrix) -> Matrix:
 
     Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
     (1 + E) has the same orthogonal factor U. X^T X - 1 = 2 E + E^2. The eigenvalues of E are above -1, so |E|
-    <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of each number.
+    <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of each interval of the
+    result.
     """
     with ctx.workprec(ctx.prec + _SPARE):
         for _ in range(6):
@@ -199,7 +203,7 @@ _WITH_QUATERNIONS = (1, 1)
 
 @dataclass(frozen=True, slots=True)
 class ExactJoint:
-    """The exact numbers of one joint in the text.
+    """The numbers of one joint in the URDF text, not rounded to doubles.
 
     Attributes:
         R: Orientation of the joint frame relative to its parent.
@@ -225,7 +229,7 @@ def read_exact(
         text: The URDF text.
         tree: The tree of the same text. If the tree has a `root_joint`, this joint is not in the text.
         among: Indices of the joints to read; None: all.
-        kind: The kind of number.
+        kind: Functions for the type of the numbers.
 
     Raises:
         InputError: a joint of the tree is not in the text.
@@ -249,7 +253,7 @@ def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArra
     return _Text(text).conversion(tree, path, q)
 
 
-@lru_cache(maxsize=1)  # parsing a large text takes longer than the enclosure of a sample
+@lru_cache(maxsize=1)  # parsing a large URDF takes longer than computing the intervals of one sample
 class _Text:
     """Reader of the joints of a URDF text."""
 
@@ -345,7 +349,10 @@ class _Text:
         return Conversion(angles, rules, np.array(lengths))
 
     def value(self, name: str, at: Mapping[str, Any]) -> _Value:
-        """Return the size of a joint's value and its error, from the values of the independent joints."""
+        """Return the absolute value and the error of a joint's coordinate.
+
+        `at` contains the independent joints' values.
+        """
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
             return _Value(abs(at[name]), 0.0, 0.0, 0)
@@ -356,11 +363,12 @@ class _Text:
 
 
 class _Value(NamedTuple):
-    """The size of a joint's value M q + C, and its error.
+    """The absolute value of a joint's value M q + C, and its error.
 
     Attributes:
         moved: |M q|.
-        offset: Sum of the sizes of the offsets, each multiplied by the multipliers after it; at least |C|.
+        offset: Sum of the absolute values of the terms of C; at least |C|. C has one term for each mimic
+            rule.
         error: Error of the value if the rules are applied one by one, in eps.
         rules: Number of rules.
     """

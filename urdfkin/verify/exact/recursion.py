@@ -82,8 +82,8 @@ def move(
 
     Args:
         tree: The robot.
-        joints: The exact numbers of the joints, by joint index. A joint comes after all joints on its path to
-            the root.
+        joints: The joints as `read_exact` returns them, by joint index. A joint comes after all joints on its
+            path to the root.
         q: (nq,) coordinates, as doubles or intervals.
         v: (nv,) joint velocities.
         a: (nv,) joint accelerations.
