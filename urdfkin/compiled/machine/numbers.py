@@ -44,7 +44,7 @@ class Lanes(types.Type):
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return the type to which a number and a product can both be converted: the type of the number."""
+        """Return this type if `other` is a `Product` of the same width, else None."""
         return self if isinstance(other, Product) and other.width == self.width else None
 
 
@@ -56,7 +56,7 @@ class Product(types.Type):
         super().__init__(name=f"Product({width})")
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return the type to which a number and a product can both be converted: the type of the number."""
+        """Return `other` if it is a `Lanes` type of the same width, else None."""
         return other if isinstance(other, Lanes) and other.width == self.width else None
 
 
