@@ -26,14 +26,15 @@ import argparse
 import collections
 import contextlib
 import json
-import queue
+import select
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
@@ -72,45 +73,30 @@ class Worker:
     def __init__(self, command: list[str], timeout: float) -> None:
         self.command, self.timeout = command, timeout
         self.process: subprocess.Popen[str] | None = None
-        self.listener: threading.Thread | None = None
-        self.lines: queue.Queue[str | None] = queue.Queue()
 
     def judge(self, family: str, number: int) -> tuple[str, str]:
         """Test a document; return the outcome and its details; a crash and a hang are possible outcomes."""
-        if self.process is None:
-            self.start()
-        assert self.process is not None
-        assert self.process.stdin is not None
+        process = self.process or self.start()
+        assert process.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # the process has ended, which the next line detects
-            self.process.stdin.write(f"{family} {number}\n")
-            self.process.stdin.flush()
+            print(family, number, file=process.stdin, flush=True)
         try:
-            line = self.lines.get(timeout=self.timeout)
-        except queue.Empty:
+            line = _line(process, self.timeout)
+        except TimeoutError:
             self.stop()
             return "hangs", f"no answer in {self.timeout:g} s"
-        if line is None:
+        if not line:
             return "kills the process", f"exit status {self.stop()}"
         word, details = json.loads(line)
         return str(word), str(details)
 
-    def start(self) -> None:
+    def start(self) -> subprocess.Popen[str]:
         """Start the process and wait until it has compiled its kernels."""
-        self.process = subprocess.Popen(
-            self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
-        self.lines = queue.Queue()
-        self.listener = threading.Thread(target=self._listen, args=(self.process, self.lines), daemon=True)
-        self.listener.start()
-        if self.lines.get(timeout=FIRST_WAIT) != READY:
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self.process = subprocess.Popen(self.command, **pipes, stderr=subprocess.DEVNULL, text=True)
+        if _line(self.process, FIRST_WAIT).strip() != READY:
             raise RuntimeError("the worker process does not start")
-
-    @staticmethod
-    def _listen(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -> None:
-        assert process.stdout is not None
-        for line in process.stdout:
-            lines.put(line.strip())
-        lines.put(None)
+        return self.process
 
     def stop(self) -> int | None:
         """Stop the process if it is running; return its exit status."""
@@ -119,14 +105,21 @@ class Worker:
         process, self.process = self.process, None
         if process.poll() is None:
             process.kill()
-        status = process.wait()
-        if self.listener is not None:
-            self.listener.join()
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                with contextlib.suppress(BrokenPipeError):
-                    pipe.close()
-        return status
+        with contextlib.suppress(BrokenPipeError), process:  # closes the pipes and waits
+            pass
+        return process.returncode
+
+
+def _line(process: subprocess.Popen[str], seconds: float) -> str:
+    """Return the next line that a process writes; "" if it has ended.
+
+    Raises:
+        TimeoutError: there is no line within this time.
+    """
+    assert process.stdout is not None
+    if not select.select([process.stdout], [], [], seconds)[0]:
+        raise TimeoutError
+    return process.stdout.readline()
 
 
 def work(seed: int) -> None:
@@ -148,19 +141,12 @@ def fuzz(
     asked: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
 ) -> collections.Counter[str]:
     """Test documents by family and number, store documents that fail, and return the counts of outcomes."""
-    waiting: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
-    for each in asked:
-        waiting.put(each)
+    waiting = iter(list(asked))
     counts: collections.Counter[str] = collections.Counter()
 
-    def run() -> None:
+    def run(_: int) -> None:
         worker = Worker([sys.executable, __file__, "--worker", "--seed", str(seed)], timeout)
-        while True:
-            try:
-                family, number = waiting.get_nowait()
-            except queue.Empty:
-                worker.stop()
-                return
+        for family, number in waiting:  # all threads take from the same iterator
             word, details = worker.judge(family, number)
             counts[word] += 1
             if word not in GOOD:
@@ -172,11 +158,10 @@ def fuzz(
                 (keep / f"{name}.txt").write_text(f"{made.words}\n{word}\n{details}\n", "utf-8")
                 print(f"{family} {number} ({made.what}): {word}", flush=True)
 
-    threads = [threading.Thread(target=run) for _ in range(jobs)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+        worker.stop()
+
+    with ThreadPoolExecutor(jobs) as pool:
+        list(pool.map(run, range(jobs)))
     return counts
 
 

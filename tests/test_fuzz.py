@@ -13,8 +13,7 @@ import pytest
 
 import urdfkin
 from scripts import fuzz
-from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
-from scripts.fuzzing.judge import Outcome
+from scripts.fuzzing import GOOD, Case, Outcome, calibrations, mjcf, robots, tables
 from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.urdf.lint.cases.arm import arm, fixed

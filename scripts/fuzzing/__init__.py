@@ -29,3 +29,11 @@ class Case:
         """Return the line of text that is stored as a note with a failing file."""
         options = f"root_joint={self.root_joint!r}, mimic={self.mimic!r}"
         return f"{self.what}; load(..., {options})"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The outcome of a test and its details. The outcome is one of `GOOD`, or the name of a failure."""
+
+    word: str
+    details: str = ""

@@ -12,8 +12,7 @@ import random
 import numpy as np
 
 import urdfkin
-from scripts.fuzzing import Case
-from scripts.fuzzing.judge import Outcome
+from scripts.fuzzing import Case, Outcome
 from urdfkin.calibration.calibrate import ImplausibleError, calibrate
 from urdfkin.calibration.parameters import urdf_model
 from urdfkin.kinematics.rotation import exp_rotation

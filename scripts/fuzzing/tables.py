@@ -6,8 +6,7 @@ import random
 import traceback
 from functools import cache
 
-from scripts.fuzzing import COMPARED, Case
-from scripts.fuzzing.judge import Outcome
+from scripts.fuzzing import COMPARED, Case, Outcome
 from urdfkin.dh.compare import compare
 from urdfkin.dh.export import export
 from urdfkin.dh.parse_table import read_table, reference_path, table_from_text
