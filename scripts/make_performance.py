@@ -20,13 +20,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 
 from scripts.benchmarking.picture import draw
 from scripts.benchmarking.tables import Words, tables
+from scripts.pages import DOCS, inserted, table
 
-DOCS = Path(__file__).parents[1] / "docs"
-PAGE, FIGURES, PICTURE = (
-    DOCS / name for name in ("performance.md", "performance.json", "images/performance.svg")
-)
+PAGE, FIGURES = DOCS / "performance.md", DOCS / "performance.json"
+PICTURE = DOCS / "images" / "performance.svg"
 NOT_MEASURED = "Not measured yet."
-_PLACE = re.compile(r"(<!-- figures: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
@@ -37,13 +35,12 @@ def page(text: str, figures: Mapping[str, Any]) -> str:
     """
     parts: dict[str, list[str]] = {"machine": [_machine(figures)]}
     for words in tables(figures):
-        parts.setdefault(words.section, []).append(_table(words))
-    places = [place[1] for place in _PLACE.findall(text)]
+        parts.setdefault(words.section, []).append(_markdown(words))
+    places = re.findall(r"<!-- figures: (\w+) -->", text)
     if set(parts) - set(places) or len(places) != len(set(places)):
         raise ValueError(f"the page has places for {places}, the figures are {list(parts)}")
-    return _PLACE.sub(
-        lambda place: place[1] + "\n\n".join(parts.get(place[2], [NOT_MEASURED])) + "\n" + place[3], text
-    )
+    texts = {place: "\n\n".join(parts.get(place, [NOT_MEASURED])) for place in places}
+    return inserted(text, **{f"figures: {place}": part for place, part in texts.items()})
 
 
 def _machine(figures: Mapping[str, Any]) -> str:
@@ -57,17 +54,10 @@ def _machine(figures: Mapping[str, Any]) -> str:
     )
 
 
-def _table(words: Words) -> str:
-    lines = [
-        f"**{words.title}**",
-        "",
-        "| " + " | ".join(words.head) + " |",
-        "|---" + "|---:" * (len(words.head) - 1) + "|",
-        *("| " + " | ".join(row) + " |" for row in words.rows),
-    ]
-    if words.remarks:
-        lines += ["", *(f"[{i + 1}] {remark}. " for i, remark in enumerate(words.remarks))]
-    return "\n".join(line.rstrip() for line in lines)
+def _markdown(words: Words) -> str:
+    remarks = "".join(f"\n[{i}] {remark}." for i, remark in enumerate(words.remarks, start=1))
+    cells = table(words.head, words.rows, left=1)
+    return f"**{words.title}**\n\n{cells}" + (f"\n{remarks}" if remarks else "")
 
 
 def main() -> None:

@@ -123,16 +123,13 @@ def test_the_path_written_out_for_one_robot_has_the_robots_jacobian_and_accelera
     with Subject(name, frame, 1) as subject:
         q, v, a = subject.q[0], subject.v[0], subject.a[0]
         of_q, of_v = (subject.plan.steps[:, place] for place in (Step.Q, Step.V))
-        x = q[of_q].tolist()
-        sines, cosines = np.sin(x).tolist(), np.cos(x).tolist()
-        J = np.zeros((6, subject.nv))
-        columns = generated.columns(subject.plan, x, sines, cosines)
-        J[:, of_v] = np.array([[*linear, *angular] for linear, angular in columns]).T
+        x, rates = q[of_q].tolist(), (v[of_v].tolist(), a[of_v].tolist())
+        numbers = [np.sin(x).tolist(), np.cos(x).tolist(), *rates]
+        J = np.reshape(generated.results(subject.plan, "jacobian", x, *numbers), (6, subject.nv))
         np.testing.assert_allclose(J, subject.robot.jacobian(q, frame), rtol=0, atol=1e-13)
-        rates = v[of_v].tolist(), a[of_v].tolist()
-        linear, angular = generated.acceleration(subject.plan, x, sines, cosines, *rates)
+        six = generated.results(subject.plan, "acceleration", x, *numbers)
         acceleration = subject.robot.acceleration(q, v, a, frame)
-        np.testing.assert_allclose([*linear, *angular], acceleration, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(six, acceleration, rtol=0, atol=1e-11)
 
 
 @pytest.mark.long

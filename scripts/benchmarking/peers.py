@@ -279,17 +279,13 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
     )
     places_q, places_v = plan.steps[:, Step.Q], plan.steps[:, Step.V]
 
-    def jacobian(q: Any) -> Any:
+    def compute(q: Any, *rates: Any) -> Any:
         x = q[places_q]
-        found = generated.columns(plan, x, jnp.sin(x), jnp.cos(x), eq)
-        J = jnp.stack([jnp.concatenate([array(part) for part in pair]) for pair in found], axis=1)
-        return jnp.zeros((6, plan.nv)).at[:, places_v].set(J)
+        v, a = (u[places_v] for u in rates or (jnp.zeros(plan.nv),) * 2)
+        numbers = generated.results(plan, quantity, x, jnp.sin(x), jnp.cos(x), v, a, eq)
+        return jnp.stack([array(number, float) for number in numbers]).reshape(subject.width(quantity))
 
-    def acceleration(q: Any, v: Any, a: Any) -> Any:
-        x, v, a = q[places_q], v[places_v], a[places_v]
-        return jnp.concatenate(generated.acceleration(plan, x, jnp.sin(x), jnp.cos(x), v, a, eq))
-
-    compiled = jax.jit(jax.vmap(jacobian if quantity == "jacobian" else acceleration))
+    compiled = jax.jit(jax.vmap(compute))
     inputs = [array(x) for x in subject.inputs(quantity, subject.n)]
     yield Work(
         "JAX, vmap and jit",
