@@ -33,6 +33,8 @@ from scripts.benchmarking.sections import (
     checked_rows,
     frame_rows,
     joint_rows,
+    parts_of_batches,
+    parts_of_calls,
     single_rows,
     size_rows,
     verified_rows,
@@ -40,7 +42,6 @@ from scripts.benchmarking.sections import (
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
 from scripts.benchmarking.tables import show
 from scripts.benchmarking.timing import DifferenceError, Row
-from scripts.benchmarking.where import parts_of_batches, parts_of_calls
 from urdfkin.compiled.preload import only
 from urdfkin.verify.oracles import versions
 
