@@ -50,29 +50,17 @@ SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints"
 
 @dataclass(frozen=True)
 class Plan:
-    """Numbers of configurations, rounds, joints and frames that the benchmark measures.
+    """Numbers of configurations, rounds, joints and frames that the benchmark measures."""
 
-    Attributes:
-        configurations: Number of configurations of a batch.
-        rounds: Number of rounds of each table.
-        first: Quantities whose first use is measured.
-        joints: Numbers of joints of the chains.
-        numbers: Number of values in a chain's batch of Jacobians.
-        frames: Numbers of frames whose placements are computed in one pass.
-        frame_configurations: Number of configurations of a batch for the measurement of `frames`.
-        sizes: Sizes of batches.
-        memory: Number of configurations for the measurement of memory.
-    """
-
-    configurations: int = 100_000
-    rounds: int = 21
-    first: tuple[str, ...] = tuple(USES)
-    joints: tuple[int, ...] = (6, 12, 25, 50, 100)
-    numbers: int = 4_000_000
-    frames: tuple[int, ...] = (1, 4, 16, 1000)
-    frame_configurations: int = 4_000
-    sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)
-    memory: int = 1_000_000
+    configurations: int = 100_000  # number of configurations of a batch
+    rounds: int = 21  # number of rounds of each table
+    first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
+    joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
+    numbers: int = 4_000_000  # number of values in a chain's batch of Jacobians
+    frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames whose placements are computed in one pass
+    frame_configurations: int = 4_000  # number of configurations of a batch for the measurement of `frames`
+    sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches
+    memory: int = 1_000_000  # number of configurations for the measurement of memory
 
 
 QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)

@@ -190,19 +190,12 @@ KINDS: dict[str, Kind] = {
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The cost of a check.
+    """The cost of a check."""
 
-    Attributes:
-        megabytes: Size of the document.
-        seconds: Processor time.
-        memory: Largest growth of the process's memory in megabytes, including the memory of the findings.
-        findings: Number of reported findings.
-    """
-
-    megabytes: float
-    seconds: float
-    memory: float
-    findings: int
+    megabytes: float  # size of the document
+    seconds: float  # processor time
+    memory: float  # largest growth of the process's memory in megabytes, including the memory of the findings
+    findings: int  # number of reported findings
 
 
 def cost_of(kind: str, size: int) -> Cost:

@@ -35,20 +35,14 @@ BASE = ("-c", "import numpy, pinocchio")
 
 @dataclass(frozen=True)
 class Row:
-    """A process to measure.
+    """A process to measure."""
 
-    Attributes:
-        what: Name of the process on the page.
-        words: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
-        most: Limit of the time, in multiples of the time of `import numpy, pinocchio`. None: the time has no
-            limit.
-        fresh: Whether the process starts with an empty kernel cache.
-    """
-
-    what: str
+    what: str  # name of the process on the page
+    #: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
     words: tuple[str, ...]
+    #: Limit of the time, in multiples of the time of `import numpy, pinocchio`. None: the time has no limit.
     most: float | None = None
-    fresh: bool = False
+    fresh: bool = False  # whether the process starts with an empty kernel cache
     seconds: list[float] = field(default_factory=list, compare=False)
 
     @property

@@ -51,17 +51,11 @@ _FILES_SKIPPED = {"CHANGELOG.md", "plain_words.py"}
 
 
 class Passage(NamedTuple):
-    """A piece of text for people, such as a line of a page, a docstring or a comment.
+    """A piece of text for people, such as a line of a page, a docstring or a comment."""
 
-    Attributes:
-        file: The file, relative to the repository.
-        line: First line of the passage.
-        text: Words of the passage.
-    """
-
-    file: str
-    line: int
-    text: str
+    file: str  # the file, relative to the repository
+    line: int  # first line of the passage
+    text: str  # words of the passage
 
 
 def passages(path: Path) -> Iterator[Passage]:

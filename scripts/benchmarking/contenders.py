@@ -35,21 +35,15 @@ PROCESSES = f"Pinocchio, {PROCESSORS} processes"
 
 @dataclass(frozen=True)
 class Contender:
-    """A library and its functions for a quantity.
+    """A library and its functions for a quantity."""
 
-    Attributes:
-        library: Name of the distribution.
-        module: Name of the module.
-        calls: Returns the library's calls for one configuration.
-        batches: Returns the library's computations of a batch; None: the calls run in a loop.
-        program: Another program that the library needs.
-    """
-
-    library: str
-    module: str
+    library: str  # name of the distribution
+    module: str  # name of the module
+    #: Returns the library's calls for one configuration.
     calls: Callable[[Subject, str], Iterator[Calls]] | None = None
+    #: Returns the library's computations of a batch; None: the calls run in a loop.
     batches: Callable[[Subject, str], Iterator[Work]] | None = None
-    program: str | None = None
+    program: str | None = None  # another program that the library needs
 
     @property
     def missing(self) -> str | None:

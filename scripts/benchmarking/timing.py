@@ -28,64 +28,40 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Work:
-    """The computation of one quantity by one contender.
+    """The computation of one quantity by one contender."""
 
-    Attributes:
-        who: Name of the contender in the tables.
-        n: Number of configurations: `compute` uses the first `n` configurations of the subject.
-        compute: The timed function.
-        result: Returns the results in urdfkin's conventions, for the first configurations. It is not timed.
-            None: there are no results to compare; for example, a task only writes the output.
-        tolerance: Allowed difference from Pinocchio.
-        remark: A remark on the measurement.
-    """
-
-    who: str
-    n: int
-    compute: Callable[[], object]
+    who: str  # name of the contender in the tables
+    n: int  # number of configurations: `compute` uses the first `n` configurations of the subject
+    compute: Callable[[], object]  # the timed function
+    #: Returns the results in urdfkin's conventions, for the first configurations. It is not timed. None:
+    #: there are no results to compare; for example, a task only writes the output.
     result: Callable[[], FloatArray] | None = None
-    tolerance: float = TOLERANCE
-    remark: str = ""
+    tolerance: float = TOLERANCE  # allowed difference from Pinocchio
+    remark: str = ""  # a remark on the measurement
 
 
 @dataclass(frozen=True)
 class Table:
-    """The common properties of the rows of a table.
+    """The common properties of the rows of a table."""
 
-    Attributes:
-        section: A name of `sections.SECTIONS`.
-        robot: A name of the catalogue, or the number of joints of a chain.
-        quantity: jacobian, acceleration or placement.
-        numbers: Number of float64 values of one configuration's result.
-        size: Number of joints, frames or configurations, whichever the table varies.
-    """
-
-    section: str
-    robot: str
-    quantity: str
-    numbers: int
-    size: int = 0
+    section: str  # a name of `sections.SECTIONS`
+    robot: str  # a name of the catalogue, or the number of joints of a chain
+    quantity: str  # jacobian, acceleration or placement
+    numbers: int  # number of float64 values of one configuration's result
+    size: int = 0  # number of joints, frames or configurations, whichever the table varies
 
 
 @dataclass(frozen=True)
 class Row(Table):
-    """One contender's measurements.
+    """One contender's measurements."""
 
-    Attributes:
-        who: Name of the contender.
-        n: Number of configurations of a call.
-        median_ns: Median time for one configuration over the rounds.
-        minimum_ns: Minimum time for one configuration.
-        ratio: Median of the baseline divided by this median; above 1 is faster than the baseline.
-        remark: A remark on the measurement.
-    """
-
-    who: str = ""
-    n: int = 0
-    median_ns: float = 0.0
-    minimum_ns: float = 0.0
+    who: str = ""  # name of the contender
+    n: int = 0  # number of configurations of a call
+    median_ns: float = 0.0  # median time for one configuration over the rounds
+    minimum_ns: float = 0.0  # minimum time for one configuration
+    #: Median of the baseline divided by this median; above 1 is faster than the baseline.
     ratio: float | None = None
-    remark: str = ""
+    remark: str = ""  # a remark on the measurement
 
 
 class DifferenceError(Exception):
@@ -178,30 +154,24 @@ class Calls:
 
     The lines become the body of a loop over configurations, and their names become local variables.
     Therefore, the measured time of a library includes no function call of the benchmark.
-
-    Attributes:
-        who: Name of the contender.
-        names: Variables that the lines use, besides `q`, `v` and `a`.
-        lines: The calls; the last line is an expression whose value is the result.
-        store: The lines for a batch, which write their result to `out[k]`. None: the batch runs `lines`, and
-            stores the value of the last line in `out[k]`.
-        order: For each coordinate of the library, its index among urdfkin's coordinates. None: the library
-            and urdfkin have the same order.
-        shape: Shape of one configuration's result in a batch; None: urdfkin's shape.
-        read: Converts a batch's raw results to urdfkin's conventions.
-        read_one: Converts the value of the last line to an array with the layout of one row of a batch.
-        remark: See `Work`.
     """
 
-    who: str
-    names: Mapping[str, Any]
-    lines: tuple[str, ...]
+    who: str  # name of the contender
+    names: Mapping[str, Any]  # variables that the lines use, besides `q`, `v` and `a`
+    lines: tuple[str, ...]  # the calls; the last line is an expression whose value is the result
+    #: The lines for a batch, which write their result to `out[k]`. None: the batch runs `lines`, and stores
+    #: the value of the last line in `out[k]`.
     store: tuple[str, ...] | None = None
+    #: For each coordinate of the library, its index among urdfkin's coordinates. None: the library and
+    #: urdfkin have the same order.
     order: list[int] | None = None
+    #: Shape of one configuration's result in a batch; None: urdfkin's shape.
     shape: tuple[int, ...] | None = None
+    #: Converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
+    #: Converts the value of the last line to an array with the layout of one row of a batch.
     read_one: Callable[[Any], FloatArray] = field(default=np.array)
-    remark: str = ""
+    remark: str = ""  # see `Work`
 
     def batch(self, subject: Subject, quantity: str) -> Work:
         """Return the timed task for a batch: a loop over all configurations that fills a reused array."""
