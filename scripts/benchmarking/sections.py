@@ -24,6 +24,7 @@ from scripts.benchmarking.contenders import (
     pinocchio_calls,
     urdfkin_batches,
 )
+from scripts.benchmarking.operations import operations
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, chain_urdf
 from scripts.benchmarking.timing import Calls, Row, Table, Work, agree, measure, times
 from urdfkin.compiled.evaluate import is_staged, task_of
@@ -83,6 +84,12 @@ def checked_rows(n: int, rounds: int) -> Iterator[Row]:
         works = [one.single(subject, quantity) for one in (*checked_calls(subject, quantity), calls)]
         agree(works, calls.batch(subject, quantity), f"{subject.name}, checked {quantity}")
         yield from measure(table, works, rounds, works[-1], time.thread_time)
+
+
+def operation_counts() -> Iterator[tuple[str, int]]:
+    """Yield "robot, quantity" and the number of operations of one configuration."""
+    for subject, quantity, _ in _contests("operations", 1):
+        yield f"{subject.name}, {quantity}", operations(subject.plan, quantity)
 
 
 def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:
