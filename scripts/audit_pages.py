@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from importlib import util
 from itertools import product
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -93,6 +93,12 @@ const style = getComputedStyle(e), box = e.getBoundingClientRect();
 const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "none") || s.boxShadow !== "none";
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
+"""
+#: JavaScript: return whether the border of the element with the focus changes if it loses the focus.
+_BORDER = """
+const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
+setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
+  const changed = border() !== focused; e.focus(); done(changed); }, 300); }, 300);
 """
 
 
@@ -323,15 +329,8 @@ def walk(browser: Browser, page: Page) -> list[str]:
 
 
 def _border_changes(browser: Browser) -> bool:
-    """Return whether an element's border changes when the element has the focus. Wait for a transition."""
-    return bool(
-        browser.chrome.execute_async_script(
-            "const done = arguments[0], e = document.activeElement;"
-            "const border = () => getComputedStyle(e).borderColor;"
-            "setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {"
-            " const changed = border() !== focused; e.focus(); done(changed); }, 300); }, 300);"
-        )
-    )
+    """Return whether the focus changes the border of its element, which may take a moment."""
+    return bool(browser.chrome.execute_async_script(_BORDER))
 
 
 def html_errors(page: Page, jar: Path) -> list[str]:
@@ -353,10 +352,8 @@ def as_pdf(browser: Browser, page: Page) -> bytes:
     """Return the page as it is printed on A4."""
     browser.become(1280, 1000)
     load(browser, page)
-    printed = browser.chrome.execute_cdp_cmd(
-        "Page.printToPDF", {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69}
-    )
-    return base64.b64decode(cast(str, printed["data"]))
+    a4 = {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69}
+    return base64.b64decode(browser.chrome.execute_cdp_cmd("Page.printToPDF", a4)["data"])
 
 
 def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, jar: Path | None) -> list[str]:
