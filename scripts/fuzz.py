@@ -10,8 +10,6 @@ There are several families of files:
 | mutants | mutants of the shipped robots |
 | names, prefixes, versions, ..., everything | random robots with one kind of unusual content, or all kinds |
 | MJCF | free bodies, equalities and default classes; MuJoCo checks them independently |
-| tables | Denavit-Hartenberg tables with damaged headers, to be rejected or compared |
-| calibrations | measured poses; joint angles in degrees and shifted rows of q must be rejected |
 
 Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, for bases
 near to and far from the origin, and compared with Pinocchio. The tests run in a worker process, which is
@@ -38,7 +36,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
-from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
+from scripts.fuzzing import GOOD, Case, mjcf, robots
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
@@ -46,7 +44,7 @@ from urdfkin.urdf.catalogue import catalogue
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
-FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES, tables.FAMILY, calibrations.FAMILY)
+FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES)
 
 
 @cache
@@ -60,10 +58,6 @@ def case(seed: int, family: str, number: int) -> Case:
     """Return one document of a family."""
     if family in mjcf.FAMILIES:
         return mjcf.robot(seed, family, number)
-    if family == tables.FAMILY:
-        return tables.sheet(seed, number)
-    if family == calibrations.FAMILY:
-        return calibrations.calibration(seed, number)
     return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
 
 
@@ -128,12 +122,11 @@ def work(seed: int) -> None:
 
     answers = sys.stdout
     sys.stdout = sys.stderr
-    judges = {tables.FAMILY: tables.judge, calibrations.FAMILY: calibrations.judge}
     judge(Case("as it is", files()[0].read_bytes()))
     print(READY, file=answers, flush=True)
     for line in sys.stdin:
         family, number = line.split()
-        outcome = judges.get(family, judge)(case(seed, family, int(number)))
+        outcome = judge(case(seed, family, int(number)))
         print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
 
 
@@ -153,7 +146,7 @@ def fuzz(
                 made = case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
                 name = f"{family}-{seed}-{number}"
-                suffix = ".xml" if family in mjcf.FAMILIES else made.suffix
+                suffix = ".xml" if family in mjcf.FAMILIES else ".urdf"
                 (keep / f"{name}{suffix}").write_bytes(made.data)
                 (keep / f"{name}.txt").write_text(f"{made.words}\n{word}\n{details}\n", "utf-8")
                 print(f"{family} {number} ({made.what}): {word}", flush=True)

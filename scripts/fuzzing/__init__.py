@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass
 
-#: Outcome of a test in which the table was read, and was compared with the UR5.
-COMPARED = "read and compared"
 #: Outcomes with which the test of a robot passes.
 GOOD = (
     "refused",
     "verified",
     "not verified, with a finding that states the reason",
     "too large to compute, with a finding that states the reason",
-    COMPARED,
 )
 
 
@@ -22,7 +19,6 @@ class Case:
     data: bytes
     root_joint: str | None = None
     mimic: bool | None = None
-    suffix: str = ".urdf"
 
     @property
     def words(self) -> str:
