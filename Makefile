@@ -34,7 +34,6 @@ search:  ## the quick tests, their properties on examples that were never tried
 
 docs:  ## the pages that are generated from the code, then the site
 	python scripts/make_pages.py
-	python scripts/make_performance.py
 	python scripts/make_tour.py
 	python scripts/make_architecture.py
 	python scripts/make_conventions.py

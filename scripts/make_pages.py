@@ -1,16 +1,18 @@
-"""Write the generated parts of pages: equations, findings, reports, judge, enclosures.
+"""Write the generated parts of pages: equations, performance, findings, reports, judge, enclosures.
 
     python scripts/make_pages.py                  # all pages
     python scripts/make_pages.py findings judge   # some pages
 
 Run this script after a change of an equation, of a code, of a robot or of a schema. Tests compare the pages
 with the output of this script. The accuracy study and the enclosures take minutes, so tests check only a part
-of their numbers.
+of their numbers. The figures of docs/performance.md and its picture are those of docs/performance.json, which
+`python scripts/benchmark.py --json docs/performance.json` writes.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -23,6 +25,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
+from scripts.benchmarking import tables
+from scripts.benchmarking.picture import draw
 from scripts.pages import DOCS, inserted, table
 from urdfkin.compiled.preload import only
 from urdfkin.kinematics.registry import table as equations
@@ -204,8 +208,8 @@ By the typical error
 {nearer_counts(lines)}. Equal errors are
 the same double. The ratio of the typical errors, urdfkin's divided by Pinocchio's, has the median
 {median(ratios):.2f}. It lies between {min(ratios):.2f} and {max(ratios):.2f}."""
-    tables = [f"## {name}\n\n{_errors(judgement.lines)}" for name, judgement in judgements.items()]
-    return {"counts": counts, "tables": "\n\n".join(tables)}
+    sections = [f"## {name}\n\n{_errors(judgement.lines)}" for name, judgement in judgements.items()]
+    return {"counts": counts, "tables": "\n\n".join(sections)}
 
 
 def _errors(lines: tuple[Line, ...]) -> str:
@@ -314,7 +318,8 @@ PARTS: dict[str, Callable[[], dict[str, str]]] = {
     "judge": study,
     "enclosures": enclosures,
 }
-PAGES = ("equations", *PARTS)
+PAGES = ("equations", "performance", *PARTS)
+FIGURES, PICTURE = DOCS / "performance.json", DOCS / "images" / "performance.svg"
 
 
 def path_of(name: str) -> Path:
@@ -324,7 +329,12 @@ def path_of(name: str) -> Path:
 
 def page(name: str) -> str:
     """Return the text of a page with current parts. The page of the equations is generated as a whole."""
-    return equations() if name == "equations" else inserted(path_of(name).read_text("utf-8"), **PARTS[name]())
+    if name == "equations":
+        return equations()
+    text = path_of(name).read_text("utf-8")
+    if name == "performance":
+        return tables.page(text, json.loads(FIGURES.read_text("utf-8")))
+    return inserted(text, **PARTS[name]())
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -336,6 +346,8 @@ def main(words: Sequence[str] | None = None) -> None:
     for name in parser.parse_args(words).pages or PAGES:
         path_of(name).write_text(page(name), "utf-8")
         print(path_of(name))
+        if name == "performance":
+            PICTURE.write_bytes(draw(json.loads(FIGURES.read_text("utf-8")), PICTURE))
 
 
 if __name__ == "__main__":

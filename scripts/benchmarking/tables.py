@@ -14,10 +14,13 @@ from rich.table import Table
 from scripts.benchmarking.contenders import COMPILED, FLOOR, ONE
 from scripts.benchmarking.generated import GENERATED
 from scripts.benchmarking.machine import EMPTY, KEPT
+from scripts.pages import inserted
+from scripts.pages import table as markdown
 
 #: The measurements of one contender, as a mapping.
 Entry = Mapping[str, Any]
 _SHARE = "times generated code"
+NOT_MEASURED = "Not measured yet."
 #: Pattern of urdfkin's name in the measurements with all threads.
 #: The name contains the number of threads of the measuring machine.
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
@@ -78,12 +81,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
 def show(figures: Mapping[str, Any], console: Console | None = None) -> None:
     """Print all tables, the machine and the libraries."""
     console = console or Console(width=110, highlight=False)
-    machine = figures["machine"]
-    console.print(
-        f"{machine['processor']}, {machine['processors']} processors, {machine['vectors']}, "
-        f"Python {machine['python']}; {figures['rounds']} rounds, float64"
-    )
-    console.print("; ".join(f"{name} {state}" for name, state in figures["libraries"].items()))
+    console.print(_machine(figures))
     for words in tables(figures):
         table = Table(title=words.title, title_justify="left", box=None, pad_edge=False, header_style="dim")
         for i, head in enumerate(words.head):
@@ -94,6 +92,35 @@ def show(figures: Mapping[str, Any], console: Console | None = None) -> None:
         console.print(table)
         for i, remark in enumerate(words.remarks):
             console.print(f"  \\[{i + 1}] {remark}")
+
+
+def page(text: str, figures: Mapping[str, Any]) -> str:
+    """Return the page `text` with the figures inserted; a missing measurement is reported in its place.
+
+    Raises:
+        ValueError: the page does not have exactly one place for a measurement.
+    """
+    parts: dict[str, list[str]] = {"machine": [_machine(figures)]}
+    for words in tables(figures):
+        remarks = "".join(f"\n[{i}] {remark}." for i, remark in enumerate(words.remarks, start=1))
+        cells = markdown(words.head, words.rows, left=1) + (f"\n{remarks}" if remarks else "")
+        parts.setdefault(words.section, []).append(f"**{words.title}**\n\n{cells}")
+    places = re.findall(r"<!-- figures: (\w+) -->", text)
+    if set(parts) - set(places) or len(places) != len(set(places)):
+        raise ValueError(f"the page has places for {places}, the figures are {list(parts)}")
+    texts = {place: "\n\n".join(parts.get(place, [NOT_MEASURED])) for place in places}
+    return inserted(text, **{f"figures: {place}": part for place, part in texts.items()})
+
+
+def _machine(figures: Mapping[str, Any]) -> str:
+    machine, versions = figures["machine"], figures["versions"]
+    libraries = figures["libraries"] | {name: versions[name] for name in ("numpy", "numba")}
+    return (
+        f"{machine['processor']}, {machine['processors']} processors, {machine['vectors']}, "
+        f"{machine['memory_gib']} GiB, {machine['system']}, Python {machine['python']}; "
+        f"{', '.join(f'{name} {state}' for name, state in libraries.items())}. "
+        f"{figures['rounds']} rounds, float64."
+    )
 
 
 def _groups(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
