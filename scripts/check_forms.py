@@ -12,6 +12,7 @@ is not run. Exit 1: results of a format differ by more than rounding, or a LaTeX
 from __future__ import annotations
 
 import argparse
+import ctypes
 import importlib.util
 import json
 import re
@@ -49,17 +50,6 @@ SAMPLES = 4
 #: Octave's symbolic package takes 20 s for six joints, so it only computes 6 tables with at most 4 joints.
 FEW, SMALL = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
-_MAIN = """
-#include <stdio.h>
-int main(void) {{
-    double q[{length}], T[16];
-    for (int s = 0; s < {count}; ++s) {{
-        for (int k = 0; k < {n}; ++k) if (scanf("%lf", &q[k]) != 1) return 1;
-        {name}_placement(q, T);
-        for (int i = 0; i < 16; ++i) printf("%.17g\\n", T[i]);
-    }}
-    return 0;
-}}"""
 _PACKAGE = "try, pkg load symbolic, catch, disp('missing'), exit(0), end"
 _DOCUMENT = r"""\documentclass{article}
 \usepackage{amsmath,booktabs,graphicx}
@@ -117,20 +107,19 @@ def elsewhere(form: str, interpreter: str) -> Run:
 
 
 def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
-    """Compile and run the C format, with warnings as errors."""
+    """Compile the C format, with warnings as errors, and call its function."""
     compiler, found = _program("cc"), Poses()
-    for job in jobs:
-        n = job.q.shape[1]
-        text = export(job.table, "c")
-        name = re.findall(r"^void (\w+)_placement\(", text, re.MULTILINE)[0]
-        main = _MAIN.format(length=max(n, 1), n=n, count=len(job.q), name=name)
-        (folder / "code.c").write_text(text + main, "utf-8")
-        subprocess.run([compiler, *_STRICT, "code.c", "-o", "code", "-lm"], cwd=folder, check=True)
-        numbers = "\n".join(repr(x) for row in job.given("c") for x in row)
-        done = subprocess.run(
-            [str(folder / "code")], input=numbers, capture_output=True, text=True, check=True
-        )
-        found.append(_read(done.stdout))
+    for k, job in enumerate(jobs):
+        text, library = export(job.table, "c"), folder / f"code{k}.so"
+        name = re.findall(r"^void (\w+_placement)\(", text, re.MULTILINE)[0]
+        (folder / "code.c").write_text(text, "utf-8")
+        command = [compiler, *_STRICT, "-shared", "-fPIC", "code.c", "-o", str(library), "-lm"]
+        subprocess.run(command, cwd=folder, check=True)
+        place = ctypes.CDLL(str(library))[name]
+        given, T = np.array(job.given("c")), np.empty((len(job.q), 4, 4))
+        for q, out in zip(given, T, strict=True):
+            place(ctypes.c_void_p(q.ctypes.data), ctypes.c_void_p(out.ctypes.data))
+        found.append(T)
     return found
 
 
