@@ -170,25 +170,17 @@ def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str,
 
 def main() -> int:
     """Run the fuzzer from the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--mutants", type=int, default=2000, help="number of mutated files to test")
-    parser.add_argument("--robots", type=int, default=2000, help="number of random robots, over all families")
-    parser.add_argument(
-        "--family",
-        action="append",
-        choices=FAMILIES,
-        help="family of robots to test; repeatable (default: all families)",
-    )
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--timeout", type=float, default=30.0, help="time limit of one robot in seconds")
-    parser.add_argument("--only", type=int, help="test only the robot with this number in its family")
-    parser.add_argument(
-        "--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure"
-    )
-    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    option = parser.add_argument
+    option("--mutants", type=int, default=2000, help="number of mutated files to test")
+    option("--robots", type=int, default=2000, help="number of random robots, over all families")
+    option("--family", action="append", choices=FAMILIES, help="repeatable (default: all families)")
+    option("--seed", type=int, default=0)
+    option("--jobs", type=int, default=1)
+    option("--timeout", type=float, default=30.0, help="time limit of one robot in seconds")
+    option("--only", type=int, help="test only the robot with this number in its family")
+    option("--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure")
+    option("--worker", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.worker:
         work(options.seed)

@@ -340,9 +340,7 @@ def page(name: str) -> str:
 def main(words: Sequence[str] | None = None) -> None:
     """Write the pages."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument(
-        "pages", nargs="*", choices=[*PAGES, []], metavar="PAGE", help="pages to write (default: all)"
-    )
+    parser.add_argument("pages", nargs="*", choices=[*PAGES, []], metavar="PAGE", help="default: all pages")
     for name in parser.parse_args(words).pages or PAGES:
         path_of(name).write_text(page(name), "utf-8")
         print(path_of(name))

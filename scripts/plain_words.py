@@ -113,9 +113,8 @@ def long_sentences(paths: list[Path]) -> list[str]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "paths", nargs="*", type=Path, default=[ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md"]
-    )
+    default = [ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md"]
+    parser.add_argument("paths", nargs="*", type=Path, default=default)
     parser.add_argument("--long", action="store_true", help="list long sentences instead")
     options = parser.parse_args()
     chosen = [path.resolve() for path in options.paths]
