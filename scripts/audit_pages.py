@@ -271,7 +271,7 @@ def scroll_through(browser: Browser) -> None:
 def look(
     browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
 ) -> list[str]:
-    """Return the faults of a page on one screen."""
+    """Return the faults of a page for one screen size."""
     where, faults = f"{width} {'dark' if dark else 'light'}", list[str]()
     browser.become(width, 844 if width < 600 else 1000, dark=dark)
     browser.requests()
@@ -329,7 +329,7 @@ def walk(browser: Browser, page: Page) -> list[str]:
 
 
 def _border_changes(browser: Browser) -> bool:
-    """Return whether the focus changes the border of its element, which may take a moment."""
+    """Return whether an element's border changes when the element has the focus. Wait for a transition."""
     return bool(browser.chrome.execute_async_script(_BORDER))
 
 

@@ -218,7 +218,7 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
 
 # -- enclosures ------------------------------------------------------------------------------------------
 
-#: Numbers of decimal digits of the compared enclosures: 15 digits, and the default number (None).
+#: Digits of the compared intervals: 15, and the default (None).
 _DIGITS = (15, None)
 
 

@@ -197,7 +197,7 @@ def judge(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = F
 
 
 def judge_named(slip: Named, *, timeout: float) -> Outcome:
-    """Run the test that must detect a named mutant."""
+    """Run the test that must fail for this mutant."""
     texts = json.dumps([slip.before, slip.after])
     word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
+import urdfkin
 from scripts import check_exports, make_pages, measure_size
+from scripts.benchmarking.operations import operations
 from scripts.pages import inserted
 from tests.cli.running import urdfkin as run
 from tests.pages import pages

@@ -16,7 +16,15 @@ from hypothesis import strategies as st
 
 from tests.cli.test_dh import run
 from tests.random_chains import trees
-from urdfkin.dh import dh_table, export, read_table, table_from_rows, to_convention, units_of
+from urdfkin.dh import (
+    dh_table,
+    export,
+    read_table,
+    table_from_mapping,
+    table_from_rows,
+    to_convention,
+    units_of,
+)
 from urdfkin.dh.compare import compare
 from urdfkin.dh.parse_table import (
     is_table_file,
@@ -27,7 +35,7 @@ from urdfkin.dh.parse_table import (
 )
 from urdfkin.dh.rows import last_digits
 from urdfkin.dh.units import NoCellError, cell_of
-from urdfkin.errors import InputError, UrdfkinError
+from urdfkin.errors import InputError, SourceError, UrdfkinError
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot.loading import load
 
