@@ -33,15 +33,10 @@ search:  ## the quick tests, their properties on examples that were never tried
 	pytest -q -n 2 -m "not slow and not browser" --hypothesis-profile=search
 
 docs:  ## the pages that are generated from the code, then the site
-	python scripts/make_equations.py
-	python scripts/make_findings.py
-	python scripts/make_reports.py
-	python scripts/make_performance.py
+	python scripts/make_pages.py
 	python scripts/make_tour.py
 	python scripts/make_architecture.py
 	python scripts/make_conventions.py
-	python scripts/make_judge.py
-	python scripts/make_enclosures.py
 	python scripts/make_libraries.py --page
 	python scripts/check_exports.py --sizes
 	python scripts/measure_size.py

@@ -25,11 +25,11 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import util
 from itertools import product
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -44,7 +44,6 @@ from urdfkin.comparison.verdict import same
 from urdfkin.report.history import as_html as history_page
 from urdfkin.report.history import history
 from urdfkin.report.html import as_files, as_html
-from urdfkin.report.reading import read_document
 from urdfkin.report.same import as_html as same_page
 from urdfkin.robot.trajectory import line
 from urdfkin.validation.campaign import validate
@@ -95,6 +94,12 @@ const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "non
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
 """
+#: JavaScript: return whether the border of the element with the focus changes if it loses the focus.
+_BORDER = """
+const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
+setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
+  const changed = border() !== focused; e.focus(); done(changed); }, 300); }, 300);
+"""
 
 
 @dataclass(frozen=True)
@@ -109,20 +114,6 @@ class Page:
     printed: bool = True
     screens: tuple[tuple[int, bool], ...] = SCREENS
     whole: bool = True  # whether to test the keyboard, the HTML and the printed page too
-
-
-@dataclass
-class Faults:
-    """The faults of one page, each with the screen on which it occurs."""
-
-    page: str
-    lines: list[str] = field(default_factory=list)
-
-    def add(self, where: str, what: str) -> None:
-        """Record a fault, but only once for each screen."""
-        line = f"{self.page}, {where}: {what}"
-        if line not in self.lines:
-            self.lines.append(line)
 
 
 def axe_script() -> str | None:
@@ -150,21 +141,20 @@ def disagreement() -> Document:
         return validate(["panda", "ur5"], samples=6).as_dict()
 
 
-def reports(folder: Path) -> Iterator[tuple[str, Callable[[], str]]]:
-    """Yield the name of each page of a report or comparison, and the function that makes it."""
+def reports(folder: Path) -> dict[str, Callable[[], str]]:
+    """Return the name of each page of a report or comparison, and the function that makes it."""
     bad = folder / "broken.urdf"
     bad.write_text('<robot name="broken"><link name="a"/><link name="a"/><joint name="j"/></robot>')
-    yield "good", lambda: as_html(validate(["panda", "ur5", "talos"], samples=6).as_dict())
-    yield "one", lambda: as_html(validate("panda", samples=20).as_dict())
-    yield "unreadable", lambda: as_html(validate([str(bad), "ur5"], samples=6).as_dict())
-    yield "disagreement", lambda: as_html(disagreement())
-    yield "history", lambda: _history(folder)
-    for name, b, within in (
-        ("same", "ur5", None),
-        ("differs", "ur10", None),
-        ("within", "ur5_limited", 1e-3),
-    ):
-        yield f"same-{name}", lambda b=b, within=within: comparison(b, within)  # type: ignore[misc]
+    return {
+        "good": lambda: as_html(validate(["panda", "ur5", "talos"], samples=6).as_dict()),
+        "one": lambda: as_html(validate("panda", samples=20).as_dict()),
+        "unreadable": lambda: as_html(validate([str(bad), "ur5"], samples=6).as_dict()),
+        "disagreement": lambda: as_html(disagreement()),
+        "history": lambda: _history(folder),
+        "same-same": lambda: comparison("ur5", None),
+        "same-differs": lambda: comparison("ur10", None),
+        "same-within": lambda: comparison("ur5_limited", 1e-3),
+    }
 
 
 def _history(folder: Path) -> str:
@@ -176,25 +166,22 @@ def _history(folder: Path) -> str:
     return history_page(history([runs]))
 
 
-def fleet_pages(folder: Path, document: Document) -> Iterator[Page]:
-    """Yield the pages of a report of many robots: the overview, each robot's page, and one page with all.
+def fleet_pages(folder: Path) -> Iterator[Page]:
+    """Yield the pages of a report of all robots: the overview, each robot's page, and one page with all.
 
     The command writes a file for each robot beside the page. `to_html` returns one text.
     """
+    document = validate(urdfkin.robots(), samples=1).as_dict()
     (folder / "fleet-robots").mkdir()
-    for place, text in as_files(document, "fleet.html"):
+    texts = {**dict(as_files(document, "fleet.html")), "fleet-text.html": as_html(document)}
+    for place, text in texts.items():
         (folder / place).write_text(text, encoding="utf-8")
     yield (page := Page("fleet", (folder / "fleet.html").as_uri()))
-    (folder / "fleet-text.html").write_text(as_html(document), encoding="utf-8")
     yield Page("fleet-text", (folder / "fleet-text.html").as_uri())
     for i, robot in enumerate(document["robots"]):
-        yield Page(
-            f"fleet-{robot['source']}",
-            f"{page.url}#robot-{i}",
-            ready=f"return !!document.querySelector('#robot-{i} :is(.checks, .reason)')",
-            screens=((390, False), (1280, True)),
-            whole=False,
-        )
+        ready = f"return !!document.querySelector('#robot-{i} :is(.checks, .reason)')"
+        name, url, screens = f"fleet-{robot['source']}", f"{page.url}#robot-{i}", ((390, False), (1280, True))
+        yield Page(name, url, ready=ready, screens=screens, whole=False)
 
 
 def comparison(b: str, within: float | None) -> str:
@@ -203,21 +190,18 @@ def comparison(b: str, within: float | None) -> str:
     return same_page(same(*robots, within=within), robots, Question(within))
 
 
-def made(folder: Path, only: list[str], fleet: Path | None = None) -> Iterator[Page]:
-    """Write the pages of reports and comparisons, and yield them."""
-    for name, make in reports(folder):
-        if only and not any(name.startswith(word) for word in only):
-            continue
-        path = folder / f"{name}.html"
-        path.write_text(make(), encoding="utf-8")
-        yield Page(name, path.as_uri())
-        if name in ("good", "disagreement"):
-            yield Page(f"{name}-unfolded", path.as_uri(), UNFOLD)
-    if not only or any(word.startswith("fleet") for word in only):
-        document = read_document(fleet) if fleet else validate(urdfkin.robots(), samples=1).as_dict()
-        for page in fleet_pages(folder, document):
-            if not only or any(page.name.startswith(word) for word in only):
-                yield page
+def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
+    """Write the wanted pages of reports, comparisons and the site, and yield them."""
+    for name, make in reports(folder).items():
+        if wanted(name):
+            path = folder / f"{name}.html"
+            path.write_text(make(), encoding="utf-8")
+            yield Page(name, path.as_uri())
+            if name in ("good", "disagreement"):
+                yield Page(f"{name}-unfolded", path.as_uri(), UNFOLD)
+    for name, pages in (("fleet", fleet_pages), ("site", site)):
+        if wanted(name):
+            yield from pages(folder)
 
 
 def site(folder: Path) -> Iterator[Page]:
@@ -229,19 +213,10 @@ def site(folder: Path) -> Iterator[Page]:
     config = load_config(str(ROOT / "mkdocs.yml"), site_dir=str(folder / "site"), strict=False)
     config.plugins.on_startup(command="build", dirty=False)
     build(config)
-    for name in (
-        "index",
-        "questions",
-        "reports",
-        "viewer",
-        "equations",
-        "lessons/planar-arm",
-        "cli",
-        "api/robot",
-    ):
-        yield Page(
-            f"site-{name.replace('/', '-')}", (folder / "site" / f"{name}.html").as_uri(), printed=False
-        )
+    named = ("index", "questions", "reports", "viewer", "equations", "lessons/planar-arm", "cli", "api/robot")
+    for name in named:
+        url = (folder / "site" / f"{name}.html").as_uri()
+        yield Page(f"site-{name.replace('/', '-')}", url, printed=False)
 
 
 @contextmanager
@@ -297,35 +272,29 @@ def look(
     browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
 ) -> list[str]:
     """Return the faults of a page for one screen size."""
-    where, faults = f"{width} {'dark' if dark else 'light'}", Faults(page.name)
+    where, faults = f"{width} {'dark' if dark else 'light'}", list[str]()
     browser.become(width, 844 if width < 600 else 1000, dark=dark)
     browser.requests()
     browser.errors()
     load(browser, page)
     if (wide := browser.js("return document.documentElement.scrollWidth")) > width:
-        faults.add(where, f"{wide} pixels wide")
-    for url in browser.requests():
-        if not url.startswith(page.own):
-            faults.add(where, f"asks for {url}")
-    for error in browser.errors():
-        faults.add(where, f"console: {error}")
+        faults.append(f"{wide} pixels wide")
+    faults += [f"asks for {url}" for url in browser.requests() if not url.startswith(page.own)]
+    faults += [f"console: {error}" for error in browser.errors()]
     if axe is not None:
         browser.js(axe)
         browser.chrome.set_script_timeout(_AXE_SECONDS)
         for impact, rule, count, nodes in browser.chrome.execute_async_script(_AXE):
-            (faults.add if impact in IMPACTS else _note)(
-                where, f"{impact} {rule}, {count} times: {'; '.join(nodes)}"
-            )
-    for name, inner, room in browser.js(_CUT):
-        faults.add(where, f"table {name}: {inner} pixels wide in {room}")
+            what = f"{impact} {rule}, {count} times: {'; '.join(nodes)}"
+            if impact in IMPACTS:
+                faults.append(what)
+            else:
+                print(f"  note {where}: {what[:300]}", flush=True)
+    faults += [f"table {name}: {inner} pixels wide in {room}" for name, inner, room in browser.js(_CUT)]
     if output is not None:
         scroll_through(browser)
         _photograph(browser, output / f"{page.name}-{where.replace(' ', '-')}.png", width, dark)
-    return faults.lines
-
-
-def _note(where: str, what: str) -> None:
-    print(f"  note {where}: {what[:300]}", flush=True)
+    return [f"{page.name}, {where}: {what}" for what in dict.fromkeys(faults)]
 
 
 def _photograph(browser: Browser, path: Path, width: int, dark: bool, most: int = 6000) -> None:
@@ -337,7 +306,7 @@ def _photograph(browser: Browser, path: Path, width: int, dark: bool, most: int 
 
 def walk(browser: Browser, page: Page) -> list[str]:
     """Move through a page with the Tab key; return faults such as an invisible focus or a focus trap."""
-    faults, seen = Faults(page.name), list[str]()
+    faults, seen = list[str](), list[str]()
     browser.become(1280, 1000)
     load(browser, page)
     for _ in range(_PRESSES):
@@ -348,27 +317,20 @@ def walk(browser: Browser, page: Page) -> list[str]:
         what, shown, sized, named = stop
         seen.append(what)
         if not shown and sized and not _border_changes(browser):
-            faults.add("keyboard", f"no visible focus on {what}")
+            faults.append(f"no visible focus on {what}")
         if not named:
-            faults.add("keyboard", f"no name of {what}")
+            faults.append(f"no name of {what}")
         if len(seen) > 5 and len(set(seen[-5:])) == 1 and not seen[-1].startswith(("input", "button")):
-            faults.add("keyboard", f"the focus stays on {what}")
+            faults.append(f"the focus stays on {what}")
             break
     if not seen and browser.js("return document.querySelectorAll('a, button, input, [tabindex]').length"):
-        faults.add("keyboard", "the Tab key reaches nothing")
-    return faults.lines
+        faults.append("the Tab key reaches nothing")
+    return [f"{page.name}, keyboard: {what}" for what in dict.fromkeys(faults)]
 
 
 def _border_changes(browser: Browser) -> bool:
     """Return whether an element's border changes when the element has the focus. Wait for a transition."""
-    return bool(
-        browser.chrome.execute_async_script(
-            "const done = arguments[0], e = document.activeElement;"
-            "const border = () => getComputedStyle(e).borderColor;"
-            "setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {"
-            " const changed = border() !== focused; e.focus(); done(changed); }, 300); }, 300);"
-        )
-    )
+    return bool(browser.chrome.execute_async_script(_BORDER))
 
 
 def html_errors(page: Page, jar: Path) -> list[str]:
@@ -390,10 +352,8 @@ def as_pdf(browser: Browser, page: Page) -> bytes:
     """Return the page as it is printed on A4."""
     browser.become(1280, 1000)
     load(browser, page)
-    printed = browser.chrome.execute_cdp_cmd(
-        "Page.printToPDF", {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69}
-    )
-    return base64.b64decode(cast(str, printed["data"]))
+    a4 = {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69}
+    return base64.b64decode(browser.chrome.execute_cdp_cmd("Page.printToPDF", a4)["data"])
 
 
 def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, jar: Path | None) -> list[str]:
@@ -410,16 +370,8 @@ def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, ja
         pdf = output / f"{page.name}.pdf"
         pdf.write_bytes(as_pdf(browser, page))
         if shutil.which("pdftoppm"):
-            command = [
-                "pdftoppm",
-                "-r",
-                "60",
-                "-png",
-                "-l",
-                str(_PAGES),
-                str(pdf),
-                str(output / f"{page.name}-print"),
-            ]
+            options = ["-r", "60", "-png", "-l", str(_PAGES)]
+            command = ["pdftoppm", *options, str(pdf), str(output / f"{page.name}-print")]
             subprocess.run(command, check=True, timeout=120)
     return lines
 
@@ -427,49 +379,34 @@ def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, ja
 def main() -> None:
     """Audit all pages, print their faults, and exit with 1 if there is one."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument(
-        "--only",
-        nargs="*",
-        default=[],
-        help="pages to audit, by the beginnings of their names: good, same, site, viewer",
-    )
+    only = "pages to audit, by the beginnings of their names: good, same, fleet, site, viewer"
+    parser.add_argument("--only", nargs="*", default=[""], help=only)
     parser.add_argument("--output", type=Path, help="folder for pictures and printed pages")
-    parser.add_argument(
-        "--fleet",
-        type=Path,
-        help="report of many robots to audit; by default the script validates all robots and writes one",
-    )
     given = parser.parse_args()
-    axe, jar, only = axe_script(), html_checker(), given.only
+    axe, jar = axe_script(), html_checker()
     if given.output is not None:
         given.output.mkdir(parents=True, exist_ok=True)
     print(f"axe: {axe.splitlines()[0] if axe else 'missing'}; HTML checker: {jar or 'missing'}")
     faults = list[str]()
+
+    def wanted(name: str) -> bool:
+        return name.startswith(tuple(given.only))
 
     def visit(browser: Browser, page: Page) -> None:
         found = audit(browser, page, given.output, axe, jar)
         faults.extend(found)
         print(f"{page.name}: {len(found)} faults", *found, sep="\n  ", flush=True)
 
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        opened(Path(folder) / "profile", flags=(_MOUSE,)) as browser,
-    ):
-        forget(browser)
-        for page in made(Path(folder), only, given.fleet):
-            visit(browser, page)
-        if not only or any(word.startswith("site") for word in only):
-            for page in site(Path(folder)):
-                if not only or any(page.name.startswith(word) for word in only):
-                    visit(browser, page)
-    for plays in (False, True) if not only or "viewer" in only else ():
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            opened(Path(folder) / "profile", flags=(_MOUSE,), draws=False) as browser,
-            viewer(plays) as page,
-        ):
+    with tempfile.TemporaryDirectory() as folder:
+        with opened(Path(folder) / "profile", flags=(_MOUSE,)) as browser:
             forget(browser)
-            visit(browser, page)
+            for page in made(Path(folder), wanted):
+                visit(browser, page)
+        for plays in (False, True) if wanted("viewer") else ():
+            profile = Path(folder) / f"viewer-{plays}"
+            with opened(profile, flags=(_MOUSE,), draws=False) as browser, viewer(plays) as page:
+                forget(browser)
+                visit(browser, page)
     print(f"{len(faults)} faults")
     sys.exit(bool(faults))
 

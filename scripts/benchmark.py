@@ -17,30 +17,20 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads of PyTorch must not slow other libraries
 
+from scripts.benchmarking import sections as measured
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
 from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_output
-from scripts.benchmarking.operations import operations
-from scripts.benchmarking.sections import (
-    batch_rows,
-    checked_rows,
-    frame_rows,
-    joint_rows,
-    single_rows,
-    size_rows,
-    verified_rows,
-)
-from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, Subject
+from scripts.benchmarking.subject import QUANTITIES, SUBJECTS
 from scripts.benchmarking.tables import show
 from scripts.benchmarking.timing import DifferenceError, Row
-from scripts.benchmarking.where import parts_of_batches, parts_of_calls
 from urdfkin.compiled.preload import only
 from urdfkin.verify.oracles import versions
 
@@ -49,29 +39,17 @@ SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints"
 
 @dataclass(frozen=True)
 class Plan:
-    """Numbers of configurations, rounds, joints and frames that the benchmark measures.
+    """Numbers of configurations, rounds, joints and frames that the benchmark measures."""
 
-    Attributes:
-        configurations: Number of configurations of a batch.
-        rounds: Number of rounds of each table.
-        first: Quantities whose first use is measured.
-        joints: Numbers of joints of the chains.
-        numbers: Number of values in a chain's batch of Jacobians.
-        frames: Numbers of frames whose placements are computed in one pass.
-        frame_configurations: Number of configurations of a batch for the measurement of `frames`.
-        sizes: Sizes of batches.
-        memory: Number of configurations for the measurement of memory.
-    """
-
-    configurations: int = 100_000
-    rounds: int = 21
-    first: tuple[str, ...] = tuple(USES)
-    joints: tuple[int, ...] = (6, 12, 25, 50, 100)
-    numbers: int = 4_000_000
-    frames: tuple[int, ...] = (1, 4, 16, 1000)
-    frame_configurations: int = 4_000
-    sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)
-    memory: int = 1_000_000
+    configurations: int = 100_000  # number of configurations of a batch
+    rounds: int = 21  # number of rounds of each table
+    first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
+    joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
+    numbers: int = 4_000_000  # number of values in a chain's batch of Jacobians
+    frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames whose placements are computed in one pass
+    frame_configurations: int = 4_000  # number of configurations of a batch for the measurement of `frames`
+    sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches
+    memory: int = 1_000_000  # number of configurations for the measurement of memory
 
 
 QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)
@@ -84,18 +62,18 @@ def rows(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -
         DifferenceError: the results of two contenders differ.
     """
     n, rounds = plan.configurations, plan.rounds
-    ways: dict[str, Callable[[], Iterator[Row]]] = {
-        "batch": lambda: batch_rows(n, contenders, rounds),
-        "single": lambda: single_rows(n, contenders, rounds),
-        "checked": lambda: checked_rows(n, rounds),
-        "verified": lambda: verified_rows(n, rounds),
-        "joints": lambda: joint_rows(plan.joints, plan.numbers, rounds),
-        "frames": lambda: frame_rows(plan.frame_configurations, plan.frames, rounds),
-        "sizes": lambda: size_rows(plan.sizes, rounds),
+    ways: dict[str, Iterator[Row]] = {
+        "batch": measured.batch_rows(n, contenders, rounds),
+        "single": measured.single_rows(n, contenders, rounds),
+        "checked": measured.checked_rows(n, rounds),
+        "verified": measured.verified_rows(n, rounds),
+        "joints": measured.joint_rows(plan.joints, plan.numbers, rounds),
+        "frames": measured.frame_rows(plan.frame_configurations, plan.frames, rounds),
+        "sizes": measured.size_rows(plan.sizes, rounds),
     }
-    for section, way in ways.items():
+    for section, way in ways.items():  # each is a generator, which measures when it is asked
         if section in sections:
-            yield from way()
+            yield from way
 
 
 def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
@@ -110,7 +88,7 @@ def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender
         "versions": versions(),
         "libraries": {contender.library: contender.state for contender in contenders},
         "rounds": plan.rounds,
-        "operations": dict(_operations()),
+        "operations": dict(measured.operation_counts()),
         "rows": [asdict(row) for row in rows(plan, sections, contenders)],
         "memory": [
             peak_over_output(name, frame, quantity, plan.memory, out=out)
@@ -120,35 +98,24 @@ def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender
         ],
     }
     if "where" in sections:
-        single = parts_of_calls(min(plan.configurations, 2_000), plan.rounds)
-        found["where"] = [*parts_of_batches(plan.configurations, plan.rounds), *single]
+        single = measured.parts_of_calls(min(plan.configurations, 2_000), plan.rounds)
+        found["where"] = [*measured.parts_of_batches(plan.configurations, plan.rounds), *single]
     if "first" in sections:
         found["first"] = list(first_uses(name, frame, plan.first))
     return found
 
 
-def _operations() -> Iterator[tuple[str, int]]:
-    for source in SUBJECTS:
-        with Subject(*source, 1) as subject:
-            for quantity in QUANTITIES:
-                yield f"{subject.name}, {quantity}", operations(subject.plan, quantity)
-
-
 def main(words: Sequence[str] | None = None) -> int:
     """Run the benchmark; return 1 if results differ."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument(
-        "--quick", action="store_true", help="make a short run with few configurations and rounds"
-    )
-    parser.add_argument("--json", type=Path, help="write the measurements to a file")
-    parser.add_argument("--plot", type=Path, help="plot the measurements: svg, png or pdf")
-    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=SECTIONS, help="some sections")
-    parser.add_argument("--no-peers", action="store_true", help="compare only urdfkin and Pinocchio")
-    parser.add_argument("--rounds", type=int, help="number of measurements of each library")
+    option = parser.add_argument
+    option("--quick", action="store_true", help="make a short run with few configurations and rounds")
+    option("--json", type=Path, help="write the measurements to a file")
+    option("--plot", type=Path, help="plot the measurements: svg, png or pdf")
+    option("--only", nargs="+", choices=SECTIONS, default=SECTIONS, help="some sections")
+    option("--no-peers", action="store_true", help="compare only urdfkin and Pinocchio")
     arguments = parser.parse_args(words)
     plan = QUICK if arguments.quick else Plan()
-    if arguments.rounds:
-        plan = replace(plan, rounds=arguments.rounds)
     try:
         with only("compiled"):
             figures = document(plan, arguments.only, ALWAYS if arguments.no_peers else ALWAYS + PEERS)

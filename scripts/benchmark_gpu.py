@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import argparse
 import ctypes
-import importlib.util
 import json
 import shutil
 import statistics
@@ -33,6 +32,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
+from scripts.pages import table as markdown
 from urdfkin.export import QUANTITIES, write
 from urdfkin.export.code import Code
 from urdfkin.export.forms import code_of_robot
@@ -129,23 +129,20 @@ def rows(code: Code, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
 
 def table(measured: Iterable[dict[str, Any]]) -> str:
     """Return the measurements as a Markdown table."""
-    lines = [
-        "| by | quantity | precision | batch | configurations/s | share of bandwidth |",
-        "|---|---|---|---:|---:|---:|",
-    ]
-    lines += [
-        f"| {x['by']} | {x['quantity']} | {x['real']} | {x['n']:,} | {x['a_second']:.3g} | {x['share']:.1%} |"
+    heads = ("by", "quantity", "precision", "batch", "configurations/s", "share of bandwidth")
+    rows = [
+        (x["by"], x["quantity"], x["real"], f"{x['n']:,}", f"{x['a_second']:.3g}", f"{x['share']:.1%}")
         for x in measured
     ]
-    return "\n".join(lines)
+    return markdown(heads, rows, left=3)
 
 
 def of_torch(code: Code) -> Iterator[str]:
     """Yield the measurements of PyTorch's export on the GPU as JSON lines; none without PyTorch and CUDA."""
-    if importlib.util.find_spec("torch") is None:
+    try:
+        import torch  # noqa: PLC0415  optional
+    except ModuleNotFoundError:
         return
-    import torch  # noqa: PLC0415  optional
-
     if not torch.cuda.is_available():
         return
     scope: dict[str, Any] = {"__name__": "measured"}
@@ -168,10 +165,11 @@ def of_torch(code: Code) -> Iterator[str]:
 def main(words: list[str] | None = None) -> int:
     """Measure, and print a table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("robot", nargs="?", default="panda", help="path or name of a robot")
-    parser.add_argument("--frame", help="link or joint; the default is the robot's tip")
-    parser.add_argument("--json", type=Path, help="file for the measurements, one per line")
-    parser.add_argument("--compile-only", action="store_true", help="compile the programs, and run none")
+    option = parser.add_argument
+    option("robot", nargs="?", default="panda", help="path or name of a robot")
+    option("--frame", help="link or joint; the default is the robot's tip")
+    option("--json", type=Path, help="file for the measurements, one per line")
+    option("--compile-only", action="store_true", help="compile the programs, and run none")
     arguments = parser.parse_args(words)
     if (compiler := nvcc()) is None:
         return _refused("nvcc is not installed. Install CUDA, or nvcc of the package registry.")

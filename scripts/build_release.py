@@ -81,9 +81,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Build and check the files of a release.")
     parser.add_argument("folder", type=Path, help="new or empty folder for the files of the release")
     parser.add_argument("--tag", help="tag of the release, such as v0.1.0")
-    parser.add_argument(
-        "--sbom-of", metavar="PYTHON", help="write a list of the packages in this Python environment"
-    )
+    parser.add_argument("--sbom-of", metavar="PYTHON", help="list the packages of this Python environment")
     options = parser.parse_args()
     if options.tag not in (None, f"v{version()}"):
         sys.exit(f"the tag is {options.tag}, and pyproject.toml has version {version()}")

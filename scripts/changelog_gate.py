@@ -88,8 +88,6 @@ def main(root: Path = ROOT, base: str | None = None) -> int:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--base", help="revision to compare with HEAD")
     sys.exit(main(base=parser.parse_args().base))

@@ -84,32 +84,28 @@ class Subject:
     def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
         """Yield (name, quantity, reference, inputs) of each result."""
         for quantity in recursive_quantities():
-            for reference in Reference if quantity.referred else (_ALIGNED,):
+            for reference in Reference if quantity.referred else (Reference.LOCAL_WORLD_ALIGNED,):
                 what = f"{self.name}/{quantity.name}/{reference.name}"
                 yield what, quantity, reference, self.inputs[: len(quantity.inputs)]
 
-
-_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+    def computed(
+        self,
+        quantity: Quantity,
+        reference: Reference,
+        frame: str | Sequence[str],
+        inputs: Sequence[Any],
+        threads: int | None = None,
+    ) -> FloatArray:
+        """Return the result of a method of the robot."""
+        words = (frame, reference) if quantity.referred else (frame,)
+        how = {} if threads is None else {"threads": threads}
+        result: FloatArray = getattr(self.robot, quantity.method)(*inputs, *words, verify=False, **how)
+        return result
 
 
 def spread(count: int) -> list[int]:
     """Return at most `FRAMES` - 1 evenly spread indices below `count`."""
     return sorted({int(i) for i in np.linspace(0, count - 1, FRAMES - 1)})
-
-
-def computed(
-    subject: Subject,
-    quantity: Quantity,
-    reference: Reference,
-    frame: str | Sequence[str],
-    inputs: Sequence[Any],
-    **how: Any,
-) -> FloatArray:
-    """Return the result of a method."""
-    words = (frame, reference) if quantity.referred else (frame,)
-    method = getattr(subject.robot, quantity.method)
-    result: FloatArray = method(*inputs, *words, verify=False, **how)
-    return result
 
 
 def same(x: FloatArray, y: FloatArray) -> bool:
@@ -125,7 +121,7 @@ def differing(subject: Subject) -> Iterator[str]:
     frame = subject.frames[0]
     for what, quantity, reference, inputs in subject.results():
         rows = list(zip(*inputs, strict=True))
-        single = np.stack([computed(subject, quantity, reference, frame, row) for row in rows])
+        single = np.stack([subject.computed(quantity, reference, frame, row) for row in rows])
         if not np.isfinite(single).all():
             yield f"{what}: a result is not finite"
         fast = getattr(subject.robot.prepare(frame, reference), quantity.method, None)
@@ -135,32 +131,30 @@ def differing(subject: Subject) -> Iterator[str]:
                 fast(*row, out=place)
             if not same(single, out):
                 yield f"{what}: prepared"
-        for n in LENGTHS:
+        for n, threads in product(LENGTHS, THREADS):
             for first in {0, min(5, len(rows) - n)}:
                 part = [x[first : first + n] for x in inputs]
-                for threads in THREADS:
-                    batch = computed(subject, quantity, reference, frame, part, threads=threads)
-                    for k in range(n):
-                        if not same(batch[k], single[first + k]):
-                            yield f"{what}: row {k} of {n} from {first} on, threads={threads}"
+                batch = subject.computed(quantity, reference, frame, part, threads)
+                for k in range(n):
+                    if not same(batch[k], single[first + k]):
+                        yield f"{what}: row {k} of {n} from {first} on, threads={threads}"
 
 
 def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
     """Compute several frames in one pass and in separate calls. Yield the results that differ."""
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
-        if not same(computed(subject, quantity, reference, subject.frames, few), now[what]):
+        if not same(subject.computed(quantity, reference, subject.frames, few), now[what]):
             yield f"{what}: several frames in one pass"
 
 
 def differing_interpreted(subject: Subject) -> Iterator[str]:
     """Yield the results that differ between Python's numbers and the kernels."""
     for what, quantity, reference, inputs in subject.results():
-        row = [x[INTERPRETED] for x in inputs]
-        found = []
+        row, found = [x[INTERPRETED] for x in inputs], []
         for way in WAYS:
             with only(way):
-                found.append(computed(subject, quantity, reference, subject.frames, row))
+                found.append(subject.computed(quantity, reference, subject.frames, row))
         if not same(*found):
             yield f"{what}: interpreted"
 
@@ -168,21 +162,23 @@ def differing_interpreted(subject: Subject) -> Iterator[str]:
 # -- before and after ------------------------------------------------------------------------------------
 
 
+def given_of(subject: Subject, count: int) -> dict[str, Any]:
+    """Return the inputs of the first configurations, and the frames, under the names of a file."""
+    found = {f"{subject.name}/{x}": batch[:count] for x, batch in zip("qva", subject.inputs, strict=True)}
+    return {**found, f"{subject.name}/frames": np.array(subject.frames)}
+
+
 def to_keep(subject: Subject) -> dict[str, Any]:
     """Return the inputs, the frames, and each result with its bound."""
-    stored: dict[str, Any] = {
-        f"{subject.name}/{x}": array for x, array in zip("qva", subject.inputs, strict=True)
-    }
-    stored[f"{subject.name}/frames"] = np.array(subject.frames)
+    stored = given_of(subject, max(LENGTHS))
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
-        parts = [computed(subject, quantity, reference, frame, few) for frame in subject.frames]
+        parts = [subject.computed(quantity, reference, frame, few) for frame in subject.frames]
         stored[what] = results = np.stack(parts, axis=1)
         call = Call(subject.robot.tree, subject.robot.plan, subject.frames, reference, None, few)
         bound = bound_of(quantity, call.part(slice(0, KEPT)))
-        stored[f"{what}/bound"] = np.broadcast_to(EPS * bound.k * bound.scale, results.shape).astype(
-            np.float32
-        )
+        limit = np.broadcast_to(EPS * bound.k * bound.scale, results.shape)
+        stored[f"{what}/bound"] = limit.astype(np.float32)
     return stored
 
 
@@ -196,10 +192,7 @@ def digest(now: Arrays) -> str:
 
 
 def share(what: str, now: Arrays, stored: Arrays) -> float:
-    """Return the difference from the stored result as a fraction of the stored bound.
-
-    The result is 0 if all bits are equal.
-    """
+    """Return the difference from the stored result as a fraction of the stored bound; 0 for equal bits."""
     if same(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])
@@ -210,59 +203,42 @@ def share(what: str, now: Arrays, stored: Arrays) -> float:
 
 
 def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
-    """Compare a robot's results with stored results.
-
-    Return a line of text and the largest fraction of a bound.
-    """
+    """Compare a robot's results with stored results; return a text and the largest fraction of a bound."""
     shares = {what: share(what, now, stored) for what in now if what.count("/") == 2}
     others = {what: x for what, x in shares.items() if x}
     if not others:
         return "equal", 0.0
     worst = max(others, key=lambda what: others[what])
-    where = worst.removeprefix(f"{name}/")
+    most, where = others[worst], worst.removeprefix(f"{name}/")
     return (
-        f"{len(others)} of {len(shares)} results differ, by at most {others[worst]:.2g} of the bound"
-        f" ({where})",
-        others[worst],
+        f"{len(others)} of {len(shares)} results differ, by at most {most:.2g} of the bound ({where})",
+        most,
     )
 
 
 # -- enclosures ------------------------------------------------------------------------------------------
-
 
 #: Digits of the compared intervals: 15, and the default (None).
 _DIGITS = (15, None)
 
 
 def enclosures(subject: Subject) -> dict[str, Any]:
-    """Return the lower and upper ends (2, ...) of all intervals of one sample.
-
-    The intervals are computed once with 15 digits and once with the default number of digits.
-    """
+    """Return the lower and upper ends (2, ...) of all intervals of one sample."""
     q, v, a = (batch[0] for batch in subject.inputs)
-    found = {f"{subject.name}/{name}": batch[:1] for name, batch in zip("qva", subject.inputs, strict=True)}
-    found[f"{subject.name}/frames"] = np.array(subject.frames)
+    found = given_of(subject, 1)
     drawn = draw_base(1, np.random.default_rng(1))
     base = BaseMotion(np.round(drawn.placement[0], 9), drawn.velocity[0], drawn.acceleration[0])
     for reference, digits, moves in product(Reference, _DIGITS, (None, base)):
         proof = subject.robot.enclose(q, v, a, subject.frames[0], reference, base=moves, digits=digits)
-        for part in (
-            proof.placement,
-            proof.velocity,
-            proof.acceleration,
-            proof.jacobian,
-            proof.jacobian_rate,
-        ):
+        for name in ("placement", "velocity", "acceleration", "jacobian", "jacobian_rate"):
+            part = getattr(proof, name)
             what = f"{subject.name}/{part.quantity}/{reference.name}/{digits}/{moves is not None}"
             found[what] = np.stack((part.lower, part.upper))
     return found
 
 
 def nested(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
-    """Compare intervals with stored intervals.
-
-    Return a line of text, and the number of intervals that are not inside their stored intervals.
-    """
+    """Compare intervals with stored ones; return a text, and the number of intervals that are outside."""
     words, wrong = [], 0
     for digits in _DIGITS:
         names = [what for what in now if what.startswith(f"{name}/") and f"/{digits}/" in what]
@@ -278,21 +254,17 @@ def nested(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the checks; return 1 if results differ unexpectedly."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("robots", nargs="*", help="names of robots in the catalogue (default: all robots)")
-    parser.add_argument("--write", type=Path, help="store the results in this file (.npz)")
-    parser.add_argument("--against", type=Path, help="compare the results with those in this file")
-    parser.add_argument(
-        "--within",
-        type=float,
-        default=0.0,
-        help="allowed difference of two results, as a fraction of their bound",
-    )
-    parser.add_argument("--enclosures", action="store_true", help="store or compare enclosures, not results")
+    option = parser.add_argument
+    option("robots", nargs="*", help="names of robots in the catalogue (default: all robots)")
+    option("--write", type=Path, help="store the results in this file (.npz)")
+    option("--against", type=Path, help="compare the results with those in this file")
+    option("--within", type=float, default=0.0, help="allowed difference, as a fraction of the bound")
+    option("--enclosures", action="store_true", help="store or compare enclosures, not results")
     given = parser.parse_args(words)
     before = None if given.against is None else np.load(given.against)
     known = catalogue() if before is None else dict.fromkeys(name.partition("/")[0] for name in before)
-    everything: dict[str, Any] = {}
-    wrong = 0
+    compare = nested if given.enclosures else compared
+    everything, wrong = dict[str, Any](), 0
     for name in given.robots or known:
         subject = Subject.of(name, before)
         found: list[str] = []
@@ -303,7 +275,6 @@ def main(words: Sequence[str] | None = None) -> int:
                 now = to_keep(subject)
                 found += [*differing(subject), *differing_in_one_pass(subject, now)]
             found += differing_interpreted(subject)
-        compare = nested if given.enclosures else compared
         everything |= now
         said, most = ("", 0.0) if before is None else compare(name, now, before)
         print(f"{name:28} {digest(now)} {said}", *found[:3], sep="\n    " if found else " ", flush=True)

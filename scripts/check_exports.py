@@ -2,7 +2,6 @@
 
     python scripts/check_exports.py --keep leaves.jsonl         # every leaf; continues a stopped run
     python scripts/check_exports.py --ways array --keep array.jsonl  # every leaf, in some languages only
-    python scripts/check_exports.py --keep leaves.jsonl --tell  # print the stored results only
     python scripts/check_exports.py --tips       # only the leaf with the longest path of each robot
     python scripts/check_exports.py --sizes      # write the sizes of the code to docs/export.md
     python scripts/check_exports.py --library torch --environment /tmp/torch  # the tips, in PyTorch
@@ -30,6 +29,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Collection, Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -37,13 +37,14 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 
 import urdfkin
 from scripts.benchmarking.subject import chain_urdf
-from scripts.pages import inserted
+from scripts.pages import DOCS, inserted, table
 from urdfkin.export import LANGUAGES, QUANTITIES, write
-from urdfkin.export.code import Code, code_of
+from urdfkin.export.code import Code
+from urdfkin.export.forms import code_of_robot
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
 
-PAGE = Path(__file__).parents[1] / "docs" / "export.md"
+PAGE = DOCS / "export.md"
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
 #: Compiled languages: the suffix of the file, the compilers, and their options.
 _COMPILED = (
@@ -58,9 +59,7 @@ _SHARE = re.compile(r"worst error (\S+) of the bound")
 
 def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> Code:
     """Return the verified code of a frame."""
-    return code_of(
-        robot.verifier, robot.plan, frame, quantities, "local_world_aligned", name=None, verify=True
-    )
+    return code_of_robot(robot, frame, quantities, "local_world_aligned", verify=True)
 
 
 def shares(written: Code, folder: Path, ways: Collection[str]) -> Iterator[tuple[str, float]]:
@@ -107,11 +106,7 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 
 def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
-    """Check the exported code of a frame.
-
-    The result has the largest errors as fractions of their bounds. It states whether all errors are within
-    the bounds.
-    """
+    """Check the exported code of a frame; return the largest errors as fractions of their bounds."""
     wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:
         written = code(robot, frame, wanted)
@@ -128,11 +123,7 @@ def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
         if (name, frame) in stored:
             continue
         here.append({"robot": name, "frame": frame, **found_of(robot, frame, ways)})
-        line = json.dumps(here[-1])
-        print(line, flush=True)
-        if keep:
-            with keep.open("a", encoding="utf-8") as file:
-                file.write(f"{line}\n")
+        store(keep, json.dumps(here[-1]))
     return tell(lines_of(keep) if keep else here)
 
 
@@ -152,11 +143,8 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
         command = [str(python), str(Path(__file__).with_name("run_exported.py")), library, *map(str, left)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder) as process:
             for line in process.stdout or ():
-                print(line, end="", flush=True)
                 stored.append(json.loads(line))
-                if keep:
-                    with keep.open("a", encoding="utf-8") as file:
-                        file.write(line)
+                store(keep, line.rstrip())
     wrong, worst = 0, dict[str, float]()
     for checked in stored:
         found = {way: share for way, share in checked.items() if isinstance(share, float)}
@@ -188,6 +176,14 @@ def lines_of(keep: Path | None) -> list[dict[str, Any]]:
     return [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()]
 
 
+def store(keep: Path | None, line: str) -> None:
+    """Print a result, and append it to the file of the stored results if there is one."""
+    print(line, flush=True)
+    if keep:
+        with keep.open("a", encoding="utf-8") as file:
+            print(line, file=file)
+
+
 def tell(lines: Sequence[dict[str, Any]]) -> int:
     """Print a summary of the results; return 1 if there is an error."""
     wrong = [line for line in lines if not line["good"]]
@@ -198,32 +194,25 @@ def tell(lines: Sequence[dict[str, Any]]) -> int:
     found = {(line["robot"], line["frame"]) for line in lines}
     trees = {name: urdfkin.load(name).tree for name in examples()}
     leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
-    tips = len(found - leaves)
-    print(
-        f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots, {tips} tips that are not"
-        " leaves;"
-        f" {len(wrong)} outside the bound or unverified; worst error as a share of the bound: {worst}"
-    )
+    counts = f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots"
+    others = f"{len(found - leaves)} tips that are not leaves"
+    print(f"{counts}, {others}; {len(wrong)} outside the bound or unverified")
+    print(f"worst error as a share of the bound: {worst}")
     return bool(wrong)
 
 
 def sizes() -> str:
     """Return the sizes of the code for three frames and each quantity, as a Markdown table."""
-    rows = ["| robot, frame | quantity | operations | lines of C | kB |", "|---|---|---:|---:|---:|"]
-    for robot, frame in (
-        (urdfkin.load("panda"), "panda_hand"),
-        (urdfkin.load("talos"), "gripper_left_base_link"),
-        (urdfkin.load(chain_urdf(100)), "tip"),
-    ):
-        for quantity in QUANTITIES:
-            written = code(robot, frame, (quantity,))
-            (function,) = written.functions
-            lines = write(written, "c").partition("#ifdef " + written.name.upper() + "_MAIN")[0]
-            rows.append(
-                f"| {robot.name}, {frame} | {quantity} | {function.operations:,} | {lines.count(chr(10)):,} |"
-                f" {len(lines) / 1000:.0f} |"
-            )
-    return "\n".join(rows) + "\n"
+    rows = []
+    frames = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), (chain_urdf(100), "tip")
+    for (source, frame), quantity in product(frames, QUANTITIES):
+        robot = urdfkin.load(source)
+        written = code(robot, frame, (quantity,))
+        (function,) = written.functions
+        lines = write(written, "c").partition("#ifdef " + written.name.upper() + "_MAIN")[0]
+        sizes = f"{function.operations:,}", f"{lines.count(chr(10)):,}", f"{len(lines) / 1000:.0f}"
+        rows.append((f"{robot.name}, {frame}", quantity, *sizes))
+    return table(("robot, frame", "quantity", "operations", "lines of C", "kB"), rows, left=2)
 
 
 def page(text: str) -> str:
@@ -234,24 +223,18 @@ def page(text: str) -> str:
 def main(words: Sequence[str] | None = None) -> int:
     """Run the checks; return 1 for an error."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument(
-        "--keep", type=Path, help="file for the results, one per line; an existing file is continued"
-    )
-    parser.add_argument("--tell", action="store_true", help="only print a summary of the stored results")
-    parser.add_argument("--tips", action="store_true", help="check only one leaf link of each robot")
-    parser.add_argument(
-        "--sizes", action="store_true", help="write the sizes of the code of three robots into docs/export.md"
-    )
-    parser.add_argument("--ways", nargs="+", choices=_WAYS, default=_WAYS, help="only these languages")
-    parser.add_argument("--library", choices=("torch", "jax"), help="check the tips in this library")
-    parser.add_argument("--environment", type=Path, help="folder of the library's virtual environment")
-    parser.add_argument("--package", help="what pip installs, for example torch==2.13.0+cpu")
+    option = parser.add_argument
+    option("--keep", type=Path, help="file for the results, one per line; an existing file is continued")
+    option("--tips", action="store_true", help="check only one leaf link of each robot")
+    option("--sizes", action="store_true", help="write the sizes of three robots' code into docs/export.md")
+    option("--ways", nargs="+", choices=_WAYS, default=_WAYS, help="only these languages")
+    option("--library", choices=("torch", "jax"), help="check the tips in this library")
+    option("--environment", type=Path, help="folder of the library's virtual environment")
+    option("--package", help="what pip installs, for example torch==2.13.0+cpu")
     arguments = parser.parse_args(words)
     if arguments.library and not arguments.environment:
         parser.error("--library needs --environment")
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-    if arguments.tell:
-        return tell(lines_of(arguments.keep))
     if arguments.library:
         return check_library(arguments.library, arguments.environment, arguments.package, arguments.keep)
     if arguments.sizes:

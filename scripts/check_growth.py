@@ -25,10 +25,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
+from scripts.pages import table
 from urdfkin.urdf.lint import check_text
 
 Kind = Callable[[int], bytes]
 
+_LINK = '<link name="l"/>'
 _JOINT = (
     '<joint name="j{i}" type="{kind}"><parent link="l{p}"/><child link="l{c}"/>'
     '<axis xyz="0 0 1"/>{more}</joint>'
@@ -39,143 +41,119 @@ def _robot(inside: str) -> bytes:
     return f'<robot name="r">{inside}</robot>'.encode()
 
 
-def _filled(size: int, piece: Callable[[int], str]) -> str:
-    """Return the concatenation of `piece(0)`, `piece(1)`, and so on, up to a size in bytes."""
-    count = max(size // len(piece(10**6)), 2)
-    return "".join(map(piece, range(count)))
+def _filled(size: int, piece: str) -> str:
+    """Return many copies of a piece, up to a size in bytes; {i} in the piece is the number of the copy."""
+    count = max(size // len(piece.format(i=10**6)), 2)
+    return piece * count if piece == piece.format(i=0) else "".join(piece.format(i=i) for i in range(count))
 
 
-def _in_base(inside: str) -> bytes:
-    return _robot(f'<link name="base">{inside}</link>')
+def _many(piece: str, before: str = _LINK) -> Kind:
+    """Return robots with a text, and many copies of a piece after it."""
+    return lambda size: _robot(before + _filled(size, piece))
 
 
-def _attribute(written: str) -> bytes:
-    ends = '<parent link="a"/><child link="b"/>'
-    return _robot(
-        f'<link name="a"/><link name="b"/><joint name="j" type="fixed">{ends}<origin {written}/></joint>'
-    )
+def _link(name: str, inside: str = "") -> bytes:
+    return _robot(f'<link name="{name}">{inside}</link>')
+
+
+def _origin(xyz: str) -> bytes:
+    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/>'
+    return _robot(f'<link name="a"/><link name="b"/>{joint}<origin xyz="{xyz}"/></joint>')
 
 
 def _tree(size: int, parent: Callable[[int], int], kind: str = "fixed", more: str = "") -> bytes:
-    links = max(size // 130, 2)
-    return _robot(
-        "".join(f'<link name="l{i}"/>\n' for i in range(links))
-        + "".join(
-            _JOINT.format(i=i, kind=kind, p=parent(i), c=i + 1, more=more.format(i - 1) if i else "")
-            for i in range(links - 1)
-        )
+    links = range(max(size // 130, 2))
+    joints = (
+        _JOINT.format(i=i, kind=kind, p=parent(i), c=i + 1, more=more.format(i - 1) if i else "")
+        for i in links[:-1]
     )
+    return _robot("".join(f'<link name="l{i}"/>\n' for i in links) + "".join(joints))
 
+
+_FIXED = '<joint name="j{i}" type="fixed">'
+_MESH = '<visual><geometry><mesh filename="package://{}"/></geometry></visual>'
+_SHAPE = '<visual><geometry><box size="1 1 1"/></geometry><material name="m"/></visual>'
+_MARKS = "a" + "\u0301\u0323" * 100
 
 KINDS: dict[str, Kind] = {
     # inputs with long or many numbers
-    "one long number": lambda n: _attribute(f'xyz="{"1" * n}e+ 0 0"'),
-    "one long decimal": lambda n: _attribute(f'xyz="0.{"1" * n} 0 0"'),
-    "many numbers in a vector": lambda n: _attribute(f'xyz="{"1 " * (n // 2)}"'),
-    "many blanks in a vector": lambda n: _attribute(f'xyz="1{" " * n}0 0"'),
-    "tabs in a vector": lambda n: _attribute('xyz="' + "\t" * n + '1 0 0"'),
-    "a number by long references": lambda n: _attribute(f'xyz="&#{"0" * n}49; 0 0"'),
-    "bad numbers": lambda n: _robot(
-        _filled(n, lambda i: f'<joint name="j{i}" type="fixed"><origin xyz="a b c"/></joint>')
-    ),
-    "signs and points": lambda n: _attribute(f'xyz="{"+." * (n // 2)} 0 0"'),
+    "one long number": lambda n: _origin(f"{'1' * n}e+ 0 0"),
+    "one long decimal": lambda n: _origin(f"0.{'1' * n} 0 0"),
+    "many numbers in a vector": lambda n: _origin("1 " * (n // 2)),
+    "many blanks in a vector": lambda n: _origin(f"1{' ' * n}0 0"),
+    "tabs in a vector": lambda n: _origin("\t" * n + "1 0 0"),
+    "a number by long references": lambda n: _origin(f"&#{'0' * n}49; 0 0"),
+    "bad numbers": _many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
+    "signs and points": lambda n: _origin(f"{'+.' * (n // 2)} 0 0"),
     # inputs with many comments that suppress findings
-    "comments that silence nothing": lambda n: _robot(
-        '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[x{i}] y -->\n")
-    ),
-    "comments behind each other": lambda n: _robot(
-        '<link name="l"/>' + _filled(n, lambda i: f"<!-- urdfkin: ignore[URDF207] y --><x{i}/>")
-    ),
-    "one long comment": lambda n: _robot(f'<!-- urdfkin: ignore[{"207 " * (n // 4)}] y --><link name="l"/>'),
+    "comments that silence nothing": _many("<!-- urdfkin: ignore[x{i}] y -->\n"),
+    "comments behind each other": _many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
+    "one long comment": lambda n: _robot(f"<!-- urdfkin: ignore[{'207 ' * (n // 4)}] y -->{_LINK}"),
     # inputs with long or many names
     "one long name": lambda n: _robot(f'<link name="{"a" * n}"/>'),
-    "one long tag": lambda n: _in_base(f"<{'a' * n}/>"),
-    "one long attribute's name": lambda n: _in_base(f'<visual {"a" * n}="1"/>'),
-    "one long type": lambda n: _robot(f'<link name="l"/><joint name="j" type="{"a" * n}"/>'),
-    "one long version": lambda n: f'<robot name="r" version="{"1" * n}.0"><link name="l"/></robot>'.encode(),
-    "one long address": lambda n: _in_base(
-        f'<visual><geometry><mesh filename="package://{"a" * n}"/></geometry></visual>'
+    "one long tag": lambda n: _link("base", f"<{'a' * n}/>"),
+    "one long attribute's name": lambda n: _link("base", f'<visual {"a" * n}="1"/>'),
+    "one long type": lambda n: _robot(f'{_LINK}<joint name="j" type="{"a" * n}"/>'),
+    "one long version": lambda n: f'<robot name="r" version="{"1" * n}.0">{_LINK}</robot>'.encode(),
+    "one long address": lambda n: _link("base", _MESH.format("a" * n)),
+    "names that say the same": _many('<link name="a"/>', ""),
+    "names of combining marks": _many(f'<link name="{{i}}{_MARKS}"/>', ""),
+    "names that look alike": _many(
+        f'<link name="{"ab" * 40}{{i}}"/><joint name="{{i}}" type="x{"ba" * 40}"/>', ""
     ),
-    "names that say the same": lambda n: _robot(_filled(n, lambda i: '<link name="a"/>')),
-    "names of combining marks": lambda n: _robot(
-        _filled(n, lambda i: f'<link name="{i}' + "a" + "\u0301\u0323" * 100 + '"/>')
+    "links by misspelt names": _many(
+        f'<link name="{"ab" * 25}{{i}}"/>{_FIXED}<parent link="{"ba" * 25}{{i}}"/><child link="c"/></joint>',
+        "",
     ),
-    "names that look alike": lambda n: _robot(
-        _filled(n, lambda i: f'<link name="{"ab" * 40}{i}"/><joint name="{i}" type="x{"ba" * 40}"/>')
-    ),
-    "links by misspelt names": lambda n: _robot(
-        _filled(
-            n,
-            lambda i: (
-                f'<link name="{"ab" * 25}{i}"/>'
-                f'<joint name="j{i}" type="fixed"><parent link="{"ba" * 25}{i}"/><child link="c"/></joint>'
-            ),
-        )
-    ),
-    "unknown links": lambda n: _robot(
-        '<link name="l"/>'
-        + _filled(
-            n,
-            lambda i: f'<joint name="j{i}" type="fixed"><parent link="x{i}"/><child link="y{i}"/></joint>',
-        )
-    ),
+    "unknown links": _many(f'{_FIXED}<parent link="x{{i}}"/><child link="y{{i}}"/></joint>'),
     "unknown leaders": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="x{}"/>'),
-    "undeclared prefixes": lambda n: _robot('<link name="l"/>' + _filled(n, lambda i: f"<p{i}:x/>")),
-    "declared prefixes": lambda n: _robot(
-        '<link name="l"/>' + _filled(n, lambda i: f'<gazebo xmlns:p{i}="http://p" p{i}:a="1"/>')
-    ),
+    "undeclared prefixes": _many("<p{i}:x/>"),
+    "declared prefixes": _many('<gazebo xmlns:p{i}="http://p" p{i}:a="1"/>'),
     # inputs with many attributes
-    "attributes of one link": lambda n: _robot(
-        f'<link name="l" {_filled(n, lambda i: f"a{i}={chr(34)}1{chr(34)} ")}/>'
-    ),
-    "unknown attributes": lambda n: _robot(
-        _filled(n, lambda i: f'<link name="l{i}" ' + "".join(f'a{k}="1" ' for k in range(60)) + "/>")
-    ),
-    "one long value": lambda n: _robot(f'<link name="l"/><material file="{"a" * n}"/>'),
-    "openings of expressions": lambda n: _robot(f'<link name="l"/><material file="{"${" * (n // 2)}"/>'),
-    "references in a value": lambda n: _robot(f'<link name="l"/><material file="{"&amp;" * (n // 5)}"/>'),
+    "attributes of one link": lambda n: _robot('<link name="l" ' + _filled(n, 'a{i}="1" ') + "/>"),
+    "unknown attributes": _many('<link name="l{i}" ' + "".join(f'a{k}="1" ' for k in range(60)) + "/>", ""),
+    "one long value": lambda n: _robot(f'{_LINK}<material file="{"a" * n}"/>'),
+    "openings of expressions": lambda n: _robot(f'{_LINK}<material file="{"${" * (n // 2)}"/>'),
+    "references in a value": lambda n: _robot(f'{_LINK}<material file="{"&amp;" * (n // 5)}"/>'),
     # inputs with long or much content between elements
-    "text": lambda n: _robot('<link name="l"/>' + "words " * (n // 6)),
-    "lines": lambda n: _robot('<link name="l"/>' + "\n" * n),
-    "lines, then a broken tag": lambda n: _robot('<link name="l"/>' + "\n" * n + "<"),
-    "references in text": lambda n: _robot('<link name="l"/>' + "&lt;" * (n // 4)),
-    "text between elements": lambda n: _robot('<link name="l"/>' + "a<gazebo/>" * (n // 10)),
-    "text like attributes": lambda n: _robot('<link name="l"/>="' + "\t" * n),
-    "text like many attributes": lambda n: _robot('<link name="l"/>' + "=\"\t='" * (n // 5)),
-    "one comment": lambda n: _robot(f'<link name="l"/><!--{"a" * n}-->'),
-    "comments": lambda n: _robot('<link name="l"/>' + "<!---->" * (n // 7)),
-    "one instruction": lambda n: f"<?a {'a' * n}?>".encode() + _robot('<link name="l"/>'),
-    "instructions": lambda n: b"<?a b?>" * (n // 7) + _robot('<link name="l"/>'),
-    "instructions inside": lambda n: _robot('<link name="l"/>' + "<?a b?>" * (n // 7)),
-    "one CDATA section": lambda n: _in_base(f"<![CDATA[{'a' * n}]]>"),
-    "CDATA sections": lambda n: _in_base("<![CDATA[a]]>" * (n // 13)),
+    "text": _many("words "),
+    "lines": _many("\n"),
+    "lines, then a broken tag": lambda n: _robot(_LINK + "\n" * n + "<"),
+    "references in text": _many("&lt;"),
+    "text between elements": _many("a<gazebo/>"),
+    "text like attributes": _many("\t", f'{_LINK}="'),
+    "text like many attributes": _many("=\"\t='"),
+    "one comment": lambda n: _robot(f"{_LINK}<!--{'a' * n}-->"),
+    "comments": _many("<!---->"),
+    "one instruction": lambda n: f"<?a {'a' * n}?>".encode() + _robot(_LINK),
+    "instructions": lambda n: b"<?a b?>" * (n // 7) + _robot(_LINK),
+    "instructions inside": _many("<?a b?>"),
+    "one CDATA section": lambda n: _link("base", f"<![CDATA[{'a' * n}]]>"),
+    "CDATA sections": lambda n: _link("base", "<![CDATA[a]]>" * (n // 13)),
     "a declaration that does not end": lambda n: b"<?xml version='1.0' " + b"?" * n,
     "a long encoding": lambda n: f'<?xml version="1.0" encoding="{"a" * n}"?>'.encode() + _robot(""),
     "undefined entities": lambda n: _robot(f'<link name="&{"a" * n};"/>'),
-    "a document type": lambda n: f"<!DOCTYPE {'a' * n}>".encode() + _robot('<link name="l"/>'),
+    "a document type": lambda n: f"<!DOCTYPE {'a' * n}>".encode() + _robot(_LINK),
     # structure
-    "links that nothing connects": lambda n: _robot(_filled(n, lambda i: f'<link name="l{i}"/>\n')),
+    "links that nothing connects": _many('<link name="l{i}"/>\n', ""),
     "a chain": lambda n: _tree(n, lambda i: i),
     "a star": lambda n: _tree(n, lambda i: 0),
     "one place for all joints": lambda n: _tree(n, lambda i: 0, "continuous"),
     "a chain of mimic joints": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="j{}"/>'),
     "a loop": lambda n: _tree(n, lambda i: i).replace(b'<child link="l1"/>', b'<child link="l0"/>', 1),
-    "several parents": lambda n: _robot(
-        '<link name="a"/><link name="b"/>'
-        + _filled(n, lambda i: f'<joint name="j{i}" type="fixed"><parent link="a"/><child link="b"/></joint>')
+    "several parents": _many(
+        f'{_FIXED}<parent link="a"/><child link="b"/></joint>', '<link name="a"/><link name="b"/>'
     ),
-    "deep nesting": lambda n: _robot('<link name="l"/>' + "<a>" * (n // 7) + "</a>" * (n // 7)),
+    "deep nesting": lambda n: _robot(_LINK + "<a>" * (n // 7) + "</a>" * (n // 7)),
     "misplaced links, deep": lambda n: _robot(
-        '<link name="l"/>' + "<a>" * 400 + '<link name="x"/>' * (n // 16) + "</a>" * 400
+        _LINK + "<a>" * 400 + '<link name="x"/>' * (n // 16) + "</a>" * 400
     ),
-    "unknown elements": lambda n: _robot('<link name="l"/>' + _filled(n, lambda i: f"<u{i}/>")),
+    "unknown elements": _many("<u{i}/>"),
     "children of one joint": lambda n: _robot(
-        '<link name="l"/><joint name="j" type="fixed">' + "<origin/>" * (n // 9) + "</joint>"
+        f'{_LINK}<joint name="j" type="fixed">{"<origin/>" * (n // 9)}</joint>'
     ),
-    "shapes": lambda n: _in_base(
-        '<visual><geometry><box size="1 1 1"/></geometry><material name="m"/></visual>' * (n // 76)
-    ),
-    "materials": lambda n: _robot('<link name="l"/>' + _filled(n, lambda i: f'<material name="m{i % 9}"/>')),
+    "shapes": lambda n: _link("base", _SHAPE * (n // 76)),
+    "materials": _many("".join(f'<material name="m{k}"/>' for k in range(9))),
     "tags that are never closed": lambda n: b'<robot name="r">' + b"<link>" * (n // 6),
     "a file cut in a tag": lambda n: b'<robot name="r"><link name="' + b"a" * n,
     # bytes
@@ -184,25 +162,18 @@ KINDS: dict[str, Kind] = {
     "zero bytes": lambda n: _robot("\0" * n),
     "a wrong byte at the end": lambda n: _robot("a" * n) + b"\xff",
     "another encoding": lambda n: ("\ufeff" + "a" * (n // 2)).encode("utf-16-le"),
-    "characters of four bytes": lambda n: _robot('<link name="l"/>' + "\U0001f600" * (n // 4)),
+    "characters of four bytes": lambda n: _robot(_LINK + "\U0001f600" * (n // 4)),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The cost of a check.
+    """The cost of a check."""
 
-    Attributes:
-        megabytes: Size of the document.
-        seconds: Processor time.
-        memory: Largest growth of the process's memory in megabytes, including the memory of the findings.
-        findings: Number of reported findings.
-    """
-
-    megabytes: float
-    seconds: float
-    memory: float
-    findings: int
+    megabytes: float  # size of the document
+    seconds: float  # processor time
+    memory: float  # largest growth of the process's memory in megabytes, including the memory of the findings
+    findings: int  # number of reported findings
 
 
 def cost_of(kind: str, size: int) -> Cost:
@@ -231,24 +202,18 @@ def _peak() -> float:
 def main() -> None:
     """Print one Markdown row for each kind of content."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument(
-        "words",
-        nargs="*",
-        help="measure only the kinds of documents with one of these words in the name (default: all)",
-    )
-    parser.add_argument(
-        "--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas"
-    )
-    parser.add_argument("--patience", type=float, default=600.0, help="time limit of one document in seconds")
-    parser.add_argument("--one", type=int, help="check one document of this many bytes in this process")
+    option = parser.add_argument
+    option("words", nargs="*", help="parts of the names of the kinds to measure (default: all)")
+    option("--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas")
+    option("--patience", type=float, default=600.0, help="time limit of one document in seconds")
+    option("--one", type=int, help="check one document of this many bytes in this process")
     options = parser.parse_args()
     if options.one is not None:
         print(json.dumps(asdict(cost_of(options.words[0], options.one))))
         return
     sizes = [float(size) for size in options.sizes.split(",")]
-    heads = [f"{size:g} MB" for size in sizes]
-    print(f"| seconds and megabytes for each megabyte of | {' | '.join(heads)} |")
-    print("|---|" + "---:|" * len(sizes))
+    heads = ["seconds and megabytes for each megabyte of", *(f"{size:g} MB" for size in sizes)]
+    print(table(heads, [], left=1))
     for kind in KINDS:
         if not options.words or any(word in kind for word in options.words):
             cells = " | ".join(_row(kind, sizes, options.patience))
@@ -259,12 +224,11 @@ def _row(kind: str, sizes: list[float], patience: float) -> list[str]:
     cells: list[str] = []
     for size in sizes:
         cost = None if cells and cells[-1] == "..." else cost_apart(kind, int(size * 1e6), patience)
-        cells.append("..." if cost is None else _cell(cost))
+        if cost is None:
+            cells.append("...")
+        else:
+            cells.append(f"{cost.seconds / cost.megabytes:.2f} s, {cost.memory / cost.megabytes:.0f} MB")
     return cells
-
-
-def _cell(cost: Cost) -> str:
-    return f"{cost.seconds / cost.megabytes:.2f} s, {cost.memory / cost.megabytes:.0f} MB"
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
     python scripts/check_same.py --keep pairs.jsonl          # continues a stopped run
     python scripts/check_same.py --keep pairs.jsonl panda    # only some robots
-    python scripts/check_same.py --keep pairs.jsonl --tell   # only print the figures of docs/same.md
 
 There are twenty-one changes. After eleven of these changes, a robot is still the same
 (`tests/comparison/pairs.py`). If `same` reports two robots as the same, all links must have the placements
@@ -22,6 +21,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -89,10 +89,7 @@ def _enclosed(found: Sameness, a: Robot, b: Robot, worst: Interval) -> dict[str,
 
 
 def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
-    """Return whether each link has the same placement in A and in B.
-
-    A is at random configurations, and B at the corresponding configurations.
-    """
+    """Return whether each link has the same placement in A and B, at corresponding random configurations."""
     q, base = a.sample(5, 1), f"link:{found.base_links[1]}"
     links = [pair for pair in found.links if pair[1] not in _tools(found)]
     T_a = a.placement(q, [f"link:{ours}" for ours, _ in links])
@@ -114,11 +111,8 @@ def summary(some: list[dict[str, Any]]) -> Iterator[str]:
         found = [one["lower"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
         if widths:
             above = f"{statistics.median(widths) - 1:.1%} (median), {max(widths) - 1:.1%} (most)"
-            below = f"{1 - min(found):.1%}"
-            yield (
-                f"{what}: {len(widths)}; the upper bound is {above} above the result of the search,"
-                f" the lower {below} below"
-            )
+            yield f"{what}: {len(widths)}; the upper bound is {above} above the result of the search,"
+            yield f"  the lower {1 - min(found):.1%} below"
     seconds = [one["seconds"] for one in some if one["change"] in UNLIKE]
     if seconds:
         yield f"seconds with bounds: median {statistics.median(seconds):.1f}, most {max(seconds):.1f}"
@@ -127,24 +121,20 @@ def summary(some: list[dict[str, Any]]) -> Iterator[str]:
 
 def main() -> int:
     """Run the checks from the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("robots", nargs="*", help="names of robots in the catalogue (default: all robots)")
     parser.add_argument("--keep", type=Path, required=True, help="file for the results, one per line")
-    parser.add_argument("--tell", action="store_true", help="only print the stored results")
     options = parser.parse_args()
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     lines = options.keep.read_text().splitlines() if options.keep.exists() else []
     some = [json.loads(line) for line in lines]
     there = {(one["robot"], one["change"]) for one in some}
-    for name in [] if options.tell else options.robots or sorted(catalogue()):
-        for what in (*ALIKE, *UNLIKE):
-            if (name, what) in there or (one := pair(name, what)) is None:
-                continue
-            some.append(one)
-            with options.keep.open("a") as file:
-                file.write(json.dumps(one) + "\n")
+    for name, what in product(options.robots or sorted(catalogue()), (*ALIKE, *UNLIKE)):
+        if (name, what) in there or (one := pair(name, what)) is None:
+            continue
+        some.append(one)
+        with options.keep.open("a") as file:
+            print(json.dumps(one), file=file)
     print(*summary([one for one in some if not options.robots or one["robot"] in options.robots]), sep="\n")
     return int(any(not one["right"] or not one.get("holds", True) for one in some))
 

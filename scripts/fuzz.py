@@ -10,8 +10,6 @@ There are several families of files:
 | mutants | mutants of the shipped robots |
 | names, prefixes, versions, ..., everything | random robots with one kind of unusual content, or all kinds |
 | MJCF | free bodies, equalities and default classes; MuJoCo checks them independently |
-| tables | Denavit-Hartenberg tables with damaged headers, to be rejected or compared |
-| calibrations | measured poses; joint angles in degrees and shifted rows of q must be rejected |
 
 Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, for bases
 near to and far from the origin, and compared with Pinocchio. The tests run in a worker process, which is
@@ -26,18 +24,19 @@ import argparse
 import collections
 import contextlib
 import json
-import queue
+import select
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
-from scripts.fuzzing import GOOD, Case, calibrations, mjcf, robots, tables
+from scripts.fuzzing import GOOD, Case, mjcf, robots
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
@@ -45,7 +44,7 @@ from urdfkin.urdf.catalogue import catalogue
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
-FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES, tables.FAMILY, calibrations.FAMILY)
+FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES)
 
 
 @cache
@@ -59,10 +58,6 @@ def case(seed: int, family: str, number: int) -> Case:
     """Return one document of a family."""
     if family in mjcf.FAMILIES:
         return mjcf.robot(seed, family, number)
-    if family == tables.FAMILY:
-        return tables.sheet(seed, number)
-    if family == calibrations.FAMILY:
-        return calibrations.calibration(seed, number)
     return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
 
 
@@ -72,45 +67,30 @@ class Worker:
     def __init__(self, command: list[str], timeout: float) -> None:
         self.command, self.timeout = command, timeout
         self.process: subprocess.Popen[str] | None = None
-        self.listener: threading.Thread | None = None
-        self.lines: queue.Queue[str | None] = queue.Queue()
 
     def judge(self, family: str, number: int) -> tuple[str, str]:
         """Test a document; return the outcome and its details; a crash and a hang are possible outcomes."""
-        if self.process is None:
-            self.start()
-        assert self.process is not None
-        assert self.process.stdin is not None
+        process = self.process or self.start()
+        assert process.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # the process has ended, which the next line detects
-            self.process.stdin.write(f"{family} {number}\n")
-            self.process.stdin.flush()
+            print(family, number, file=process.stdin, flush=True)
         try:
-            line = self.lines.get(timeout=self.timeout)
-        except queue.Empty:
+            line = _line(process, self.timeout)
+        except TimeoutError:
             self.stop()
             return "hangs", f"no answer in {self.timeout:g} s"
-        if line is None:
+        if not line:
             return "kills the process", f"exit status {self.stop()}"
         word, details = json.loads(line)
         return str(word), str(details)
 
-    def start(self) -> None:
+    def start(self) -> subprocess.Popen[str]:
         """Start the process and wait until it has compiled its kernels."""
-        self.process = subprocess.Popen(
-            self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
-        )
-        self.lines = queue.Queue()
-        self.listener = threading.Thread(target=self._listen, args=(self.process, self.lines), daemon=True)
-        self.listener.start()
-        if self.lines.get(timeout=FIRST_WAIT) != READY:
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        self.process = subprocess.Popen(self.command, **pipes, stderr=subprocess.DEVNULL, text=True)
+        if _line(self.process, FIRST_WAIT).strip() != READY:
             raise RuntimeError("the worker process does not start")
-
-    @staticmethod
-    def _listen(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -> None:
-        assert process.stdout is not None
-        for line in process.stdout:
-            lines.put(line.strip())
-        lines.put(None)
+        return self.process
 
     def stop(self) -> int | None:
         """Stop the process if it is running; return its exit status."""
@@ -119,14 +99,21 @@ class Worker:
         process, self.process = self.process, None
         if process.poll() is None:
             process.kill()
-        status = process.wait()
-        if self.listener is not None:
-            self.listener.join()
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                with contextlib.suppress(BrokenPipeError):
-                    pipe.close()
-        return status
+        with contextlib.suppress(BrokenPipeError), process:  # closes the pipes and waits
+            pass
+        return process.returncode
+
+
+def _line(process: subprocess.Popen[str], seconds: float) -> str:
+    """Return the next line that a process writes; "" if it has ended.
+
+    Raises:
+        TimeoutError: there is no line within this time.
+    """
+    assert process.stdout is not None
+    if not select.select([process.stdout], [], [], seconds)[0]:
+        raise TimeoutError
+    return process.stdout.readline()
 
 
 def work(seed: int) -> None:
@@ -135,12 +122,11 @@ def work(seed: int) -> None:
 
     answers = sys.stdout
     sys.stdout = sys.stderr
-    judges = {tables.FAMILY: tables.judge, calibrations.FAMILY: calibrations.judge}
     judge(Case("as it is", files()[0].read_bytes()))
     print(READY, file=answers, flush=True)
     for line in sys.stdin:
         family, number = line.split()
-        outcome = judges.get(family, judge)(case(seed, family, int(number)))
+        outcome = judge(case(seed, family, int(number)))
         print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
 
 
@@ -148,35 +134,27 @@ def fuzz(
     asked: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
 ) -> collections.Counter[str]:
     """Test documents by family and number, store documents that fail, and return the counts of outcomes."""
-    waiting: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
-    for each in asked:
-        waiting.put(each)
+    waiting = iter(list(asked))
     counts: collections.Counter[str] = collections.Counter()
 
-    def run() -> None:
+    def run(_: int) -> None:
         worker = Worker([sys.executable, __file__, "--worker", "--seed", str(seed)], timeout)
-        while True:
-            try:
-                family, number = waiting.get_nowait()
-            except queue.Empty:
-                worker.stop()
-                return
+        for family, number in waiting:  # all threads take from the same iterator
             word, details = worker.judge(family, number)
             counts[word] += 1
             if word not in GOOD:
                 made = case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
                 name = f"{family}-{seed}-{number}"
-                suffix = ".xml" if family in mjcf.FAMILIES else made.suffix
+                suffix = ".xml" if family in mjcf.FAMILIES else ".urdf"
                 (keep / f"{name}{suffix}").write_bytes(made.data)
                 (keep / f"{name}.txt").write_text(f"{made.words}\n{word}\n{details}\n", "utf-8")
                 print(f"{family} {number} ({made.what}): {word}", flush=True)
 
-    threads = [threading.Thread(target=run) for _ in range(jobs)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+        worker.stop()
+
+    with ThreadPoolExecutor(jobs) as pool:
+        list(pool.map(run, range(jobs)))
     return counts
 
 
@@ -192,25 +170,17 @@ def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str,
 
 def main() -> int:
     """Run the fuzzer from the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--mutants", type=int, default=2000, help="number of mutated files to test")
-    parser.add_argument("--robots", type=int, default=2000, help="number of random robots, over all families")
-    parser.add_argument(
-        "--family",
-        action="append",
-        choices=FAMILIES,
-        help="family of robots to test; repeatable (default: all families)",
-    )
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--timeout", type=float, default=30.0, help="time limit of one robot in seconds")
-    parser.add_argument("--only", type=int, help="test only the robot with this number in its family")
-    parser.add_argument(
-        "--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure"
-    )
-    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    option = parser.add_argument
+    option("--mutants", type=int, default=2000, help="number of mutated files to test")
+    option("--robots", type=int, default=2000, help="number of random robots, over all families")
+    option("--family", action="append", choices=FAMILIES, help="repeatable (default: all families)")
+    option("--seed", type=int, default=0)
+    option("--jobs", type=int, default=1)
+    option("--timeout", type=float, default=30.0, help="time limit of one robot in seconds")
+    option("--only", type=int, help="test only the robot with this number in its family")
+    option("--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure")
+    option("--worker", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.worker:
         work(options.seed)

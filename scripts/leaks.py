@@ -8,11 +8,12 @@ from __future__ import annotations
 import argparse
 import gc
 import json
-import os
 import sys
 import tempfile
 import warnings
 from pathlib import Path
+
+import psutil
 
 import urdfkin
 from urdfkin.compiled.preload import only
@@ -46,12 +47,9 @@ def use(k: int, folder: Path) -> None:
 def usage() -> dict[str, float]:
     """Return the resident memory in MiB, the open descriptors, and the objects of the garbage collector."""
     gc.collect()
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return {
-        "MiB": pages * os.sysconf("SC_PAGE_SIZE") / 2**20,
-        "descriptors": len(os.listdir("/proc/self/fd")),  # noqa: PTH208  a Path opens one more descriptor
-        "objects": len(gc.get_objects()),
-    }
+    here = psutil.Process()
+    memory = here.memory_info().rss / 2**20
+    return {"MiB": memory, "descriptors": here.num_fds(), "objects": len(gc.get_objects())}
 
 
 def measure(n: int) -> list[dict[str, float]]:

@@ -19,11 +19,12 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.pages import inserted
+from scripts.pages import DOCS, inserted
+from scripts.pages import table as markdown
 
-ROOT = Path(__file__).resolve().parents[1]
-PAGE, PICTURE = ROOT / "docs" / "architecture.md", ROOT / "docs" / "images" / "architecture.svg"
-PLAN = tomllib.loads((ROOT / "docs" / "architecture.toml").read_text(encoding="utf-8"))
+ROOT = DOCS.parent
+PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
+PLAN = tomllib.loads((DOCS / "architecture.toml").read_text(encoding="utf-8"))
 
 #: For each foreign library: the module or the packages that may import it.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
@@ -47,12 +48,8 @@ PACKAGES = [Package(**package) for package in PLAN["package"]]
 @cache
 def modules() -> dict[str, Path]:
     """Return every module's path by its name."""
-    files = [path for tree in _TREES for path in sorted((ROOT / tree).rglob("*.py"))]
-    return {_module(path): path for path in files}
-
-
-def _module(path: Path) -> str:
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    files = [path.relative_to(ROOT) for tree in _TREES for path in sorted((ROOT / tree).rglob("*.py"))]
+    return {".".join(path.with_suffix("").parts).removesuffix(".__init__"): ROOT / path for path in files}
 
 
 def package_of(module: str) -> str:
@@ -115,12 +112,9 @@ def _reexported(package: str) -> frozenset[str]:
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
         return frozenset()
-    taken = (
-        node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.ImportFrom)
-    )
-    return frozenset(
-        alias.asname or alias.name for node in taken if node.module != package for alias in node.names
-    )
+    body = ast.parse(path.read_text(encoding="utf-8")).body
+    taken = [node for node in body if isinstance(node, ast.ImportFrom) and node.module != package]
+    return frozenset(alias.asname or alias.name for node in taken for alias in node.names)
 
 
 def upwards() -> list[str]:
@@ -153,16 +147,14 @@ def _reached(module: str) -> set[str]:
 
 def arrows() -> set[tuple[str, str]]:
     """Return the pairs (package, imported package)."""
-    pairs = {
-        (package_of(module), package_of(other)) for module, others in imports().items() for other in others
-    }
+    pairs = ((package_of(one), package_of(other)) for one, others in imports().items() for other in others)
     return {(one, other) for one, other in pairs if one != other}
 
 
 def table() -> str:
     """Return the packages as a Markdown table, in order."""
-    rows = [f"| `{one.name}` | {one.purpose} | {one.contents} |" for one in PACKAGES]
-    return "\n".join(("| Package | Purpose | Contents |", "|---|---|---|", *rows))
+    rows = [(f"`{one.name}`", one.purpose, one.contents) for one in PACKAGES]
+    return markdown(("Package", "Purpose", "Contents"), rows)
 
 
 _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
@@ -179,11 +171,8 @@ def picture() -> str:
         f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
     ]
     for number, package in enumerate(PACKAGES):
-        y, own, purpose = (
-            _TOP + _ROW * number,
-            _LEFT + _CELL * number,
-            escape(package.purpose.replace("`", "")),
-        )
+        y, own = _TOP + _ROW * number, _LEFT + _CELL * number
+        purpose = escape(package.purpose.replace("`", ""))
         lines += [
             f'<rect x="6" y="{y}" width="{own + _CELL - 8}" height="{_ROW - 4}" rx="5" fill="#eef2f7"/>',
             f'<rect x="6" y="{y}" width="{_LEFT - 16}" height="{_ROW - 4}" rx="5" fill="#0072B2"/>',

@@ -17,24 +17,25 @@ import re
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
+import pinocchio as pin
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
-from scripts.pages import inserted
+from scripts.pages import DOCS, inserted, table
 from urdfkin.model.conventions import Convention, find_convention
 from urdfkin.model.conventions.convention import _built_in, spelled
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
 
-PAGE = Path(__file__).parents[1] / "docs" / "conventions.md"
+PAGE = DOCS / "conventions.md"
 DATA = Path(__file__).parents[1] / "urdfkin" / "model" / "conventions" / "conventions.toml"
 
 _LIMIT = '<limit lower="-2" upper="2" effort="1" velocity="1"/>'
@@ -87,7 +88,6 @@ UNLIKE = _robot(
     _joint("b", "continuous", "l1", "l2", '<mimic joint="a"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
-LIBRARIES = ("urdfkin", "pinocchio", "mujoco")
 #: Robots without masses and with negative masses.
 LIGHT, NEGATIVE = ARM.replace(_BODY, ""), ARM.replace('value="1"', 'value="-1"')
 #: MuJoCo's free joint connects a body to the world only.
@@ -134,33 +134,24 @@ def which(found: FloatArray, readings: Readings) -> str:
     return named[0]
 
 
-@dataclass(frozen=True)
-class Row:
-    """A row of the table: a convention and the answer of each library."""
-
-    question: str
-    urdfkin: str
-    pinocchio: str
-    mujoco: str
+#: A row of the table: a convention, and the answers of urdfkin, Pinocchio and MuJoCo.
+Row = tuple[str, str, str, str]
 
 
 class MeasuredMotion:
     """One motion of one robot, computed by each library and by difference quotients."""
 
     def __init__(self, seed: int = 0) -> None:
-        import mujoco  # noqa: PLC0415  an optional dependency
-        import pinocchio as pin  # noqa: PLC0415
-
-        self.mj, self.pin, rng = mujoco, pin, np.random.default_rng(seed)
+        rng = np.random.default_rng(seed)
         self.q, self.v, self.a = rng.uniform(-1.0, 1.0, (3, 3))
         self.robot = urdfkin.load(ARM)
-        self.model = pin.buildModelFromXML(ARM)
+        self.model: Any = pin.buildModelFromXML(ARM)
         self.data = self.model.createData()
         pin.forwardKinematics(self.model, self.data, self.q, self.v, self.a)
         pin.updateFramePlacements(self.model, self.data)
         pin.computeJointJacobians(self.model, self.data, self.q)
         self.frame = self.model.getFrameId("l3")
-        self.mj_model = mujoco.MjModel.from_xml_string(ARM)
+        self.mj_model: Any = mujoco.MjModel.from_xml_string(ARM)
         self.mj_data = mujoco.MjData(self.mj_model)
         self.mj_data.qpos[:], self.mj_data.qvel[:] = self.q, self.v
         mujoco.mj_fwdPosition(self.mj_model, self.mj_data)
@@ -178,20 +169,16 @@ class MeasuredMotion:
     def motion(self) -> tuple[FloatArray, ...]:
         """Return R, p, velocity, w, acceleration and alpha of the frame's origin, in world axes."""
         h = 1e-3
-        ps = {i: self.path(i * h)[:3, 3] for i in (-2, -1, 0, 1, 2)}
-        Rs = {i: self.path(i * h)[:3, :3] for i in (-2, -1, 0, 1, 2)}
-
-        def first(x: Mapping[int, FloatArray]) -> FloatArray:
-            return (x[-2] - 8.0 * x[-1] + 8.0 * x[1] - x[2]) / (12.0 * h)
-
-        def second(x: Mapping[int, FloatArray]) -> FloatArray:
-            return (-x[-2] + 16.0 * x[-1] - 30.0 * x[0] + 16.0 * x[1] - x[2]) / (12.0 * h * h)
+        T = {i: self.path(i * h) for i in (-2, -1, 0, 1, 2)}
+        rate = (T[-2] - 8.0 * T[-1] + 8.0 * T[1] - T[2]) / (12.0 * h)
+        rate_2 = (-T[-2] + 16.0 * T[-1] - 30.0 * T[0] + 16.0 * T[1] - T[2]) / (12.0 * h * h)
+        R = T[0][:3, :3]
 
         def axial(S: FloatArray) -> FloatArray:
             return np.array([S[2, 1] - S[1, 2], S[0, 2] - S[2, 0], S[1, 0] - S[0, 1]]) / 2.0
 
-        R, R_rate = Rs[0], first(Rs)
-        return R, ps[0], first(ps), axial(R_rate @ R.T), second(ps), axial(second(Rs) @ R.T)
+        w, alpha = (axial(x[:3, :3] @ R.T) for x in (rate, rate_2))
+        return R, T[0][:3, 3], rate[:3, 3], w, rate_2[:3, 3], alpha
 
     def velocity_readings(self) -> dict[str, FloatArray]:
         """Return the frame's velocity according to each of six candidate definitions.
@@ -205,212 +192,165 @@ class MeasuredMotion:
             "of the frame's origin, in its own axes": (R.T @ v, R.T @ w),
             "of the body point at the world origin, in world axes": (v - np.cross(w, p), w),
         }
-        found = {}
-        for name, (linear, angular) in points.items():
-            found[f"[linear; angular] {name}"] = np.concatenate((linear, angular))
-            found[f"[angular; linear] {name}"] = np.concatenate((angular, linear))
-        return found
+        linear_first = {f"[linear; angular] {name}": np.concatenate(parts) for name, parts in points.items()}
+        other = {f"[angular; linear] {name}": np.concatenate(parts[::-1]) for name, parts in points.items()}
+        return linear_first | other
 
     def acceleration_readings(self, *, flipped: bool) -> dict[str, FloatArray]:
         """Return candidate accelerations in world axes: classical or spatial, with or without gravity."""
         _, _, v, w, a, alpha = self.motion()
-        up = np.array([0.0, 0.0, 9.81])
+        up, spatial = np.array([0.0, 0.0, 9.81]), a - np.cross(w, v)
         linear = {
             "classical: the second derivative of the origin's position": a,
-            "spatial: the classical acceleration minus w x v": a - np.cross(w, v),
+            "spatial: the classical acceleration minus w x v": spatial,
             "classical, plus 9.81 m/s^2 upwards for gravity": a + up,
-            "spatial, plus 9.81 m/s^2 upwards for gravity": a - np.cross(w, v) + up,
+            "spatial, plus 9.81 m/s^2 upwards for gravity": spatial + up,
         }
         return {name: np.concatenate((alpha, x) if flipped else (x, alpha)) for name, x in linear.items()}
-
-    def pinocchios_jacobian(self) -> FloatArray:
-        """Return Pinocchio's Jacobian (6, 3) in LOCAL_WORLD_ALIGNED."""
-        aligned = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        J: FloatArray = self.pin.getFrameJacobian(self.model, self.data, self.frame, aligned)
-        return J
-
-    def mj_columns(self) -> FloatArray:
-        """Return MuJoCo's `jacp` above `jacr` (6, 3), at the body's origin."""
-        linear, angular = np.zeros((3, 3)), np.zeros((3, 3))
-        self.mj.mj_jac(self.mj_model, self.mj_data, linear, angular, self.mj_data.xpos[self.body], self.body)
-        return np.vstack((linear, angular))
 
     def mujocos(self, function: Callable[..., None], local: int) -> FloatArray:
         """Return a six-vector (6,) in MuJoCo's own order."""
         six = np.empty(6)
-        function(self.mj_model, self.mj_data, self.mj.mjtObj.mjOBJ_XBODY, self.body, six, local)
+        function(self.mj_model, self.mj_data, mujoco.mjtObj.mjOBJ_XBODY, self.body, six, local)
         return six
 
 
 def rows() -> list[Row]:
     """Return all rows of the table."""
-    return [*_six_vectors(), *_accelerations(), *_layout(), *_free()]
-
-
-def _six_vectors() -> list[Row]:
     asked = MeasuredMotion()
-    pin, R = asked.pin, asked.pin.ReferenceFrame
-    readings = asked.velocity_readings()
-    found = [
-        Row(
-            f"velocity, `{name}`",
-            which(asked.robot.velocity(asked.q, asked.v, "l3", name), readings),
-            which(pin.getFrameVelocity(asked.model, asked.data, asked.frame, reference).vector, readings),
-            "not available"
-            if local is None
-            else which(asked.mujocos(asked.mj.mj_objectVelocity, local), readings)
-            + f" (`flg_local={local}`)",
-        )
-        for name, reference, local in (
-            ("local_world_aligned", R.LOCAL_WORLD_ALIGNED, 0),
-            ("local", R.LOCAL, 1),
-            ("world", R.WORLD, None),
-        )
-    ]
-    columns = asked.mj_columns() @ asked.v
-    return [
-        *found,
-        Row(
-            "rows of a Jacobian, from J v",
-            which(asked.robot.jacobian(asked.q, "l3") @ asked.v, readings),
-            which(asked.pinocchios_jacobian() @ asked.v, readings),
-            f"`mj_jac`, `jacp` above `jacr`: {which(columns, readings)}",
-        ),
-        Row(
-            "velocity stored in the data structure",
-            "none",
-            f"`data.v`: {which(asked.data.v[asked.model.frames[asked.frame].parentJoint].vector, readings)}",
-            f"`cvel`: {which(np.array(asked.mj_data.cvel[asked.body]), _about(asked))}",
-        ),
-    ]
+    return [*_six_vectors(asked), _accelerations(asked), *_layout(), *_free()]
+
+
+def _six_vectors(asked: MeasuredMotion) -> Iterator[Row]:
+    """Yield the rows about velocities and Jacobians."""
+    robot, readings, frame = asked.robot, asked.velocity_readings(), (asked.model, asked.data, asked.frame)
+    for name, local in (("local_world_aligned", 0), ("local", 1), ("world", None)):
+        theirs = pin.getFrameVelocity(*frame, getattr(pin, name.upper())).vector
+        mujocos = "not available"
+        if local is not None:
+            found = asked.mujocos(mujoco.mj_objectVelocity, local)
+            mujocos = f"{which(found, readings)} (`flg_local={local}`)"
+        ours = robot.velocity(asked.q, asked.v, "l3", name)
+        yield f"velocity, `{name}`", which(ours, readings), which(theirs, readings), mujocos
+    columns = np.zeros((6, 3))  # MuJoCo's `jacp` above `jacr`, at the body's origin
+    at = asked.mj_data.xpos[asked.body]
+    mujoco.mj_jac(asked.mj_model, asked.mj_data, columns[:3], columns[3:], at, asked.body)
+    yield (
+        "rows of a Jacobian, from J v",
+        which(robot.jacobian(asked.q, "l3") @ asked.v, readings),
+        which(pin.getFrameJacobian(*frame, pin.LOCAL_WORLD_ALIGNED) @ asked.v, readings),
+        f"`mj_jac`, `jacp` above `jacr`: {which(columns @ asked.v, readings)}",
+    )
+    stored = asked.data.v[asked.model.frames[asked.frame].parentJoint].vector
+    yield (
+        "velocity stored in the data structure",
+        "none",
+        f"`data.v`: {which(stored, readings)}",
+        f"`cvel`: {which(np.array(asked.mj_data.cvel[asked.body]), _about(asked))}",
+    )
 
 
 def _about(asked: MeasuredMotion) -> dict[str, FloatArray]:
     """Return candidate velocities of further points of the body."""
     _, p, v, w, _, _ = asked.motion()
     com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
+    at_com = "[angular; linear] of the body point at the tree's centre of mass, in world axes"
     return {
-        "[angular; linear] of the body point at the tree's centre of mass, in world axes": np.concatenate(
-            (w, v + np.cross(w, com - p))
-        ),
+        at_com: np.concatenate((w, v + np.cross(w, com - p))),
         "[angular; linear] of the frame's origin, in world axes": np.concatenate((w, v)),
     }
 
 
-def _accelerations() -> list[Row]:
-    asked = MeasuredMotion()
-    pin, aligned = asked.pin, asked.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+def _accelerations(asked: MeasuredMotion) -> Row:
     readings, flipped = asked.acceleration_readings(flipped=False), asked.acceleration_readings(flipped=True)
-    frame = asked.model, asked.data, asked.frame, aligned
+    frame = asked.model, asked.data, asked.frame, pin.LOCAL_WORLD_ALIGNED
     ours = which(asked.robot.acceleration(asked.q, asked.v, asked.a, "l3"), readings)
     theirs = which(pin.getFrameAcceleration(*frame).vector, readings)
     classical = which(pin.getFrameClassicalAcceleration(*frame).vector, readings)
-    mujocos = which(asked.mujocos(asked.mj.mj_objectAcceleration, 0), flipped)
-    return [
-        Row(
-            "acceleration, in world axes",
-            f"`acceleration`: {ours}",
-            f"`getFrameAcceleration`: {theirs}; `getFrameClassicalAcceleration`: {classical}",
-            f"`mj_objectAcceleration`: {mujocos}, [angular; linear]",
-        )
-    ]
+    mujocos = which(asked.mujocos(mujoco.mj_objectAcceleration, 0), flipped)
+    return (
+        "acceleration, in world axes",
+        f"`acceleration`: {ours}",
+        f"`getFrameAcceleration`: {theirs}; `getFrameClassicalAcceleration`: {classical}",
+        f"`mj_objectAcceleration`: {mujocos}, [angular; linear]",
+    )
 
 
-def _order(names: list[str]) -> str:
+def _order(names: Iterable[str]) -> str:
     orders = {
-        "depth first, sibling joints by name": ["a", "z", "k"],
-        "depth first, in file order": ["z", "k", "a"],
-        "in file order": ["z", "a", "k"],
-        "by name": ["a", "k", "z"],
+        "azk": "depth first, sibling joints by name",
+        "zka": "depth first, in file order",
+        "zak": "in file order",
+        "akz": "by name",
     }
-    return next(name for name, order in orders.items() if order == names)
+    return orders["".join(names)]
 
 
-def _layout() -> list[Row]:
-    import mujoco  # noqa: PLC0415
-    import pinocchio as pin  # noqa: PLC0415
-
-    def joints(model: Any) -> list[str]:
-        return [model.joint(i).name for i in range(model.njnt)]
-
-    limbs = mujoco.MjModel.from_xml_string(LIMBS)
-    turns = mujoco.MjModel.from_xml_string(TURNS)
-    follows = mujoco.MjModel.from_xml_string(FOLLOWS)
+def _layout() -> Iterator[Row]:
+    """Yield the rows about coordinates, mimic joints, and links without a possible mass."""
+    limbs, turns, follows = (mujoco.MjModel.from_xml_string(text) for text in (LIMBS, TURNS, FOLLOWS))
     data = mujoco.MjData(follows)
     data.qpos[:] = 0.7, 0.0, 0.0
     mujoco.mj_kinematics(follows, data)
-    lags = data.qpos[1] == 0.0 and follows.neq == 1
-    free = pin.buildModelFromXML(FOLLOWS)
-    coupled = pin.buildModelFromXML(FOLLOWS, mimic=True)
-    return [
-        Row(
-            "order of coordinates",
-            _order(list(urdfkin.load(LIMBS).coordinate_names)),
-            _order(list(pin.buildModelFromXML(LIMBS).names)[1:]),
-            _order(joints(limbs)),
-        ),
-        Row(
-            "numbers in q for a continuous joint",
-            f"{urdfkin.load(TURNS).nq // 3}, the angle",
-            f"{pin.buildModelFromXML(TURNS).nq // 3}, its cosine and sine",
-            f"{turns.nq // 3}, the angle",
-        ),
-        Row(
-            "a joint with `<mimic>`",
-            f"coupled: {urdfkin.load(FOLLOWS).nq} coordinates for 3 joints",
-            f"independent, {free.nq} coordinates; coupled with `mimic=True`, {coupled.nq}",
-            f"independent, {follows.nq} coordinates; {follows.neq} constraint, in the dynamics only"
-            if lags
-            else "coupled",
-        ),
-        Row("a continuous joint with `<mimic>` of a revolute joint", *map(_reads(UNLIKE), LIBRARIES)),
-        Row("a moving link without `<inertial>`", *map(_reads(LIGHT), LIBRARIES)),
-        Row("a link with negative mass", *map(_reads(NEGATIVE), LIBRARIES)),
-    ]
+    mujocos = "coupled"
+    if data.qpos[1] == 0.0 and follows.neq == 1:
+        mujocos = f"independent, {follows.nq} coordinates; {follows.neq} constraint, in the dynamics only"
+    free, coupled = (pin.buildModelFromXML(FOLLOWS, mimic=mimic) for mimic in (False, True))
+    yield (
+        "order of coordinates",
+        _order(urdfkin.load(LIMBS).coordinate_names),
+        _order(list(pin.buildModelFromXML(LIMBS).names)[1:]),
+        _order(limbs.joint(i).name for i in range(limbs.njnt)),
+    )
+    yield (
+        "numbers in q for a continuous joint",
+        f"{urdfkin.load(TURNS).nq // 3}, the angle",
+        f"{pin.buildModelFromXML(TURNS).nq // 3}, its cosine and sine",
+        f"{turns.nq // 3}, the angle",
+    )
+    yield (
+        "a joint with `<mimic>`",
+        f"coupled: {urdfkin.load(FOLLOWS).nq} coordinates for 3 joints",
+        f"independent, {free.nq} coordinates; coupled with `mimic=True`, {coupled.nq}",
+        mujocos,
+    )
+    yield "a continuous joint with `<mimic>` of a revolute joint", *_readers(UNLIKE)
+    yield "a moving link without `<inertial>`", *_readers(LIGHT)
+    yield "a link with negative mass", *_readers(NEGATIVE)
 
 
-def _reads(text: str) -> Callable[[str], str]:
-    """Return a function that tests whether a library reads a text."""
-    import mujoco  # noqa: PLC0415
-    import pinocchio as pin  # noqa: PLC0415
+def _readers(text: str) -> tuple[str, str, str]:
+    """Return whether urdfkin, Pinocchio and MuJoCo read a text."""
 
-    def answer(library: str) -> str:
+    def reads(load: Callable[..., object], **how: bool) -> bool:
         try:
-            if library == "urdfkin":
-                with warnings.catch_warnings(record=True) as caught:
-                    warnings.simplefilter("always")
-                    urdfkin.load(text, verify=False)
-                codes = sorted({code for w in caught for code in re.findall(r"URDF\d+", str(w.message))})
-                return f"read, with {', '.join(codes)}" if codes else "read"
-            if library == "mujoco":
-                mujoco.MjModel.from_xml_string(text)
-                return "read"
-            pin.buildModelFromXML(text)
+            load(text, **how)
         except ValueError:
-            return "refused"
-        try:
-            pin.buildModelFromXML(text, mimic=True)
-        except ValueError:
-            return "read; with `mimic=True` refused"
-        return "read"
+            return False
+        return True
 
-    return answer
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        ours = "read" if reads(urdfkin.load, verify=False) else "refused"
+    codes = sorted({code for w in caught for code in re.findall(r"URDF\d+", str(w.message))})
+    theirs = "read" if reads(pin.buildModelFromXML) else "refused"
+    if theirs == "read" and not reads(pin.buildModelFromXML, mimic=True):
+        theirs = "read; with `mimic=True` refused"
+    mujocos = "read" if reads(mujoco.MjModel.from_xml_string) else "refused"
+    return f"{ours}, with {', '.join(codes)}" if codes else ours, theirs, mujocos
 
 
-def _free() -> list[Row]:
-    """Return the two rows of the table about a free body: the order of q, and the axes of v."""
-    import mujoco  # noqa: PLC0415
-    import pinocchio as pin  # noqa: PLC0415
-
+def _free() -> Iterator[Row]:
+    """Yield the two rows of the table about a free body: the order of q, and the axes of v."""
     rng = np.random.default_rng(1)
     xyzw = rng.normal(size=4)
     xyzw /= np.linalg.norm(xyzw)
     p, rates = rng.normal(size=3), rng.normal(size=6)
     robot = urdfkin.load(FREE_URDF)
     R = robot.placement([*p, *xyzw], "l1")[:3, :3]
-    model = pin.buildModelFromXML(FREE_URDF)
-    data = model.createData()
-    mj_model = mujoco.MjModel.from_xml_string(FREE)
+    model: Any = pin.buildModelFromXML(FREE_URDF)
+    data, frame = model.createData(), model.getFrameId("l1")
+    mj_model: Any = mujoco.MjModel.from_xml_string(FREE)
     mj_data = mujoco.MjData(mj_model)
 
     def mujocos(qpos: FloatArray) -> FloatArray:
@@ -419,47 +359,38 @@ def _free() -> list[Row]:
         mujoco.mj_fwdVelocity(mj_model, mj_data)
         return np.array(mj_data.xmat[1].reshape(3, 3))
 
+    def pinocchios(q: FloatArray) -> FloatArray:
+        pin.framesForwardKinematics(model, data, q)
+        return np.array(data.oMf[frame].rotation)
+
     orders = {
-        "x, y, z, then qx, qy, qz, qw": [*p, *xyzw],
-        "x, y, z, then qw, qx, qy, qz": [*p, *np.roll(xyzw, 1)],
+        "x, y, z, then qx, qy, qz, qw": np.array([*p, *xyzw]),
+        "x, y, z, then qw, qx, qy, qz": np.array([*p, *np.roll(xyzw, 1)]),
     }
 
     def layout(turned: Callable[[FloatArray], FloatArray]) -> str:
-        return which(R, {name: turned(np.array(q)) for name, q in orders.items()})
+        return which(R, {name: turned(q) for name, q in orders.items()})
 
-    def pinocchios(q: FloatArray) -> FloatArray:
-        pin.framesForwardKinematics(model, data, q)
-        return np.array(data.oMf[model.getFrameId("l1")].rotation)
-
-    written = [layout(f) for f in (lambda q: robot.placement(q, "l1")[:3, :3], pinocchios, mujocos)]
+    ours = layout(lambda q: robot.placement(q, "l1")[:3, :3])
+    yield "q of a free body", ours, layout(pinocchios), layout(mujocos)
     axes = {
         "both in the body's own axes": np.concatenate((R @ rates[:3], R @ rates[3:])),
         "linear in world axes, angular in the body's own": np.concatenate((rates[:3], R @ rates[3:])),
         "both in world axes": rates,
     }
-    six = np.empty(6)
+    six, q = np.empty(6), np.array([*p, *xyzw])
     mujoco.mj_objectVelocity(mj_model, mj_data, mujoco.mjtObj.mjOBJ_XBODY, 1, six, 0)
-    q = np.array([*p, *xyzw])
     pin.forwardKinematics(model, data, q, rates)
-    frame = model.getFrameId("l1")
-    theirs = pin.getFrameVelocity(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED).vector
-    return [
-        Row("q of a free body", *written),
-        Row(
-            "v of a free body",
-            which(robot.velocity(q, rates, "l1"), axes),
-            which(theirs, axes),
-            which(np.roll(six, 3), axes),
-        ),
-    ]
+    theirs = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
+    found = robot.velocity(q, rates, "l1"), theirs, np.roll(six, 3)
+    yield "v of a free body", which(found[0], axes), which(found[1], axes), which(found[2], axes)
 
 
 def _table(names: tuple[str, ...]) -> str:
     """Return a table with a column for each convention."""
     columns = [_cells(find_convention(name)) for name in names]
-    heads = f"| | {' | '.join(f'{find_convention(x).title} (`{x}`)' for x in names)} |\n{'|---' * 8}|\n"
-    lines = [f"| {what} | {' | '.join(column[what] for column in columns)} |\n" for what in columns[0]]
-    return heads + "".join(lines)
+    heads = ["", *(f"{find_convention(name).title} (`{name}`)" for name in names)]
+    return table(heads, [(what, *(column[what] for column in columns)) for what in columns[0]])
 
 
 def _cells(how: Convention) -> dict[str, str]:
@@ -539,13 +470,9 @@ def _address(source: str) -> str:
 
 def page() -> str:
     """Return the text of the page."""
-    import mujoco  # noqa: PLC0415
-    import pinocchio as pin  # noqa: PLC0415
-
-    heads = f"| | urdfkin | Pinocchio {pin.__version__} | MuJoCo {mujoco.__version__} |\n|---|---|---|---|\n"
-    table = [f"| {row.question} | {row.urdfkin} | {row.pinocchio} | {row.mujoco} |\n" for row in rows()]
-    tools = "\n".join(map(_table, _TABLES))
-    return inserted(PAGE.read_text("utf-8"), measured=heads + "".join(table), tools=tools)
+    heads = ("", "urdfkin", f"Pinocchio {pin.__version__}", f"MuJoCo {mujoco.__version__}")
+    tools = "\n\n".join(map(_table, _TABLES))
+    return inserted(PAGE.read_text("utf-8"), measured=table(heads, rows()), tools=tools)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Write docs/libraries.md and docs/libraries.json: how robotics libraries read each feature of URDF.
+"""Write docs/libraries.json and the tables of docs/libraries.md: how libraries read each feature of URDF.
 
     python scripts/make_libraries.py [LIBRARY ...] [--environments FOLDER]  # install, run, write both
     python scripts/make_libraries.py --page  # write the page from the JSON file
@@ -28,12 +28,12 @@ import platformdirs
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
+from scripts.pages import DOCS, inserted, table
 from urdfkin.comparison.readers import values_of
 from urdfkin.validation.vectors import Feature, features
 from urdfkin.verify import adapters
 from urdfkin.verify.adapters import LIBRARIES
 
-DOCS = Path(__file__).parents[1] / "docs"
 PAGE, FIGURES, LISTED = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json", "toml"))
 DATA: dict[str, Any] = tomllib.loads(LISTED.read_text("utf-8"))
 #: The features of the table, by name.
@@ -48,44 +48,13 @@ RIGHT = 1e-9
 #: After a crash or a timeout, the limit begins again for the remaining features.
 _SECONDS = 60
 _QUOTED = 160
-
-_HEAD = """# How libraries read URDF
-
-Each row is a feature of the [URDF standard](https://wiki.ros.org/urdf/XML), as a robot of two or three
-joints (`robots/features.toml`). Each cell compares the poses of all links with the expected ones, at
-{configurations} random configurations. The expected poses are urdfkin's, checked by Pinocchio. A test
-compares them with a second reader, which was written from the standard alone (`tests/urdf_standard.py`).
-
-| Cell | Meaning |
-|---|---|
-| right | The poses agree to {right:g}. |
-| a number | The library raised no error. Largest difference of a position (m) or an entry of a rotation. |
-| a number *and a letter* | The library states this difference; the note below says how. |
-| refused | The library raised an error, which is quoted below. |
-
-Each library is used in its own convention, in the order of its own joints, by an adapter of about 20 lines
-(`urdfkin/verify/adapters.py`). The adapter sets the independent joints only. If a library leaves a mimic
-joint free, the joint stays at zero. This table says nothing about other qualities of a library, and nothing
-about other versions. pytorch_kinematics is missing because it needs PyTorch, whose package installs
-CUDA's libraries. PyRoki is missing because pip found no release of it.
-
-"""
-_FOOT = """
-`python scripts/make_libraries.py` installs the libraries, each in an environment of its own, and writes this
-page and `docs/libraries.json`. [Defects of other libraries](upstream.md) has programs that show some of these
-differences.
-
-## How do libraries read your file?
-
-`urdfkin readers ROBOT` makes the same comparison for your robot, with the libraries that are installed beside
-urdfkin. For each joint that a library reads differently, it names the element of the file:
-
-```sh
-urdfkin readers talos --with mujoco,yourdfpy
-```
-
-In Python, `urdfkin.comparison.readers.compare_readers(robot)` returns the same result.
-"""
+#: For each verdict about a cell: the title of its row of sums.
+VERDICTS = {
+    "right": "right",
+    "wrong": "different, without an error",
+    "documented": "different, and stated",
+    "refused": "refused",
+}
 
 
 def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
@@ -124,9 +93,8 @@ def cell(feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[s
     notes += [f"{name} is free" for name in free]
     if notes:
         found["note"] = "; ".join(notes)
-    if any(
-        feature.name in one["features"] and one["library"] == library for one in DATA.get("documented", ())
-    ):
+    documented = DATA.get("documented", ())
+    if any(feature.name in one["features"] and one["library"] == library for one in documented):
         found["verdict"] = "documented"
     return found
 
@@ -190,8 +158,8 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
     }
 
 
-def page(figures: Mapping[str, Any]) -> str:
-    """Return the text of the page."""
+def page(text: str, figures: Mapping[str, Any]) -> str:
+    """Return the page with the cells, the stated differences, the features and the reasons."""
     cells, versions = figures["cells"], figures["versions"]
     notes = _documented(figures)
     letters = {id(one): chr(ord("a") + i) for i, one in enumerate(notes)}
@@ -206,78 +174,62 @@ def page(figures: Mapping[str, Any]) -> str:
                 return f"{number} *{letters[id(note)]}*"
         return number
 
-    titles = [f"{LIBRARIES[name].title} {versions[name]}" for name in cells]
-    names = list(FEATURES)
-    lines = [f"| | {' | '.join(titles)} |", "|---" * (1 + len(titles)) + "|"]
-    lines += [f"| {name} | {' | '.join(words(library, name) for library in cells)} |" for name in names]
+    rows = [(name, *(words(library, name) for library in cells)) for name in FEATURES]
     verdicts = {name: Counter(one["verdict"] for one in cells[name].values()) for name in cells}
-    lines += [
-        f"| *{title}* | {' | '.join(str(verdicts[name][verdict]) for name in cells)} |"
-        for verdict, title in (
-            ("right", "right"), ("wrong", "different, without an error"),
-            ("documented", "different, and stated"), ("refused", "refused"),
-        )
-    ]  # fmt: skip
-    parts = [
-        _HEAD.format(configurations=figures["configurations"], right=figures["tolerance"]),
-        _joined(lines),
+    rows += [
+        (f"*{title}*", *(str(verdicts[name][verdict]) for name in cells))
+        for verdict, title in VERDICTS.items()
     ]
-    parts += ["\n## Stated differences\n\n"] if notes else []
-    parts += [
-        f"- *{letters[id(n)]}*, {LIBRARIES[n['library']].title}: {n['words']} ([source]({n['source']}))\n"
+    stated = [
+        f"- *{letters[id(n)]}*, {LIBRARIES[n['library']].title}: {n['words']} ([source]({n['source']}))"
         for n in notes
     ]
-    parts += ["\n## The features\n\n| Feature | Rule of the standard |\n|---|---|\n"]
-    parts += [f"| {name} | {feature.rule} |\n" for name, feature in FEATURES.items()]
-    parts += ["\n## Why a cell differs\n\n", *_reasons(cells)]
-    return "".join(parts) + _FOOT
+    features = [(name, feature.rule) for name, feature in FEATURES.items()]
+    return inserted(
+        text,
+        cells=table(["", *(f"{LIBRARIES[name].title} {versions[name]}" for name in cells)], rows),
+        stated="\n".join(stated),
+        features=table(("Feature", "Rule of the standard"), features),
+        reasons=table(("Library", "Features", "Message, or the joints"), _reasons(cells)),
+    )
 
 
 def _documented(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [
-        note
-        for note in DATA.get("documented", ())
-        if any(
-            figures["cells"].get(note["library"], {}).get(feature, {}).get("verdict") == "documented"
-            for feature in note["features"]
-        )
-    ]
+    """Return the notes about a cell that is different as the library's documents state."""
+
+    def applies(note: Mapping[str, Any]) -> bool:
+        column = figures["cells"].get(note["library"], {})
+        return any(column.get(name, {}).get("verdict") == "documented" for name in note["features"])
+
+    return [note for note in DATA.get("documented", ()) if applies(note)]
 
 
-def _reasons(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the Markdown table of messages and notes: each row has a library and one of its messages."""
-    yield "| Library | Features | Message, or the joints |\n|---|---|---|\n"
+def _reasons(cells: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield a library, its features and the message or note that they have in common."""
     for library, column in cells.items():
         reasons: dict[str, list[str]] = {}
         for feature, one in column.items():
             if reason := one.get("message") or one.get("note"):
-                quoted = one["verdict"] == "refused"
                 clean = reason.replace("|", r"\|").replace("`", "'")
-                reasons.setdefault(f"`{clean}`" if quoted else clean, []).append(feature)
+                quoted = f"`{clean}`" if one["verdict"] == "refused" else clean
+                reasons.setdefault(quoted, []).append(feature)
         for reason, names in reasons.items():
-            yield f"| {LIBRARIES[library].title} | {'; '.join(names)} | {reason} |\n"
-
-
-def _joined(lines: list[str]) -> str:
-    return "".join(f"{line}\n" for line in lines)
+            yield LIBRARIES[library].title, "; ".join(names), reason
 
 
 def main() -> None:
     """Install and run the libraries, and write the page and the JSON file."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument(
-        "libraries", nargs="*", choices=[*DATA["versions"], []], help="libraries; by default all"
-    )
-    parser.add_argument(
-        "--environments", type=Path, default=platformdirs.user_cache_path("urdfkin-libraries")
-    )
+    names, folder = list(DATA["versions"]), platformdirs.user_cache_path("urdfkin-libraries")
+    parser.add_argument("libraries", nargs="*", choices=[*names, []], help="libraries; by default all")
+    parser.add_argument("--environments", type=Path, default=folder, help=f"default: {folder}")
     parser.add_argument("--page", action="store_true", help="write the page from the JSON file")
     given = parser.parse_args()
     before = json.loads(FIGURES.read_text("utf-8")) if FIGURES.exists() else {}
     if not given.page:
-        before = measure(given.environments, given.libraries or list(DATA["versions"]), before)
+        before = measure(given.environments, given.libraries or names, before)
         FIGURES.write_text(json.dumps(before, indent=1) + "\n", "utf-8")
-    PAGE.write_text(page(before), "utf-8")
+    PAGE.write_text(page(PAGE.read_text("utf-8"), before), "utf-8")
 
 
 if __name__ == "__main__":

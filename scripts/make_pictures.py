@@ -10,7 +10,7 @@ import tempfile
 import time
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 
@@ -29,12 +29,7 @@ from urdfkin.view.figure import GREEN, VERMILION
 from urdfkin.view.server import new_server
 from urdfkin.view.viewer import Viewer
 
-if TYPE_CHECKING:
-    pass
-
 POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
-
-
 #: For each suffix of a screenshot's file name: whether the screenshot has the dark theme.
 THEMES = (("", False), ("-dark", True))
 
@@ -43,14 +38,8 @@ def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
     """Draw two axes in red and green."""
     for k, color in enumerate((VERMILION, GREEN)):
         arrow(axes, at, 0.17 * R[:, k], color)
-        axes.text(
-            *(at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]),
-            "xy"[k],
-            color=color,
-            ha="center",
-            va="center",
-            fontsize=9,
-        )
+        place = at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]
+        axes.text(*place, "xy"[k], color=color, ha="center", va="center", fontsize=9)
 
 
 def reference_frames() -> Any:
@@ -65,9 +54,8 @@ def reference_frames() -> Any:
         ("world", np.zeros(2), world, "(0, -0.5): velocity of the point at the origin"),
     )
     for axes, (reference, at, R, title) in zip(panels, told, strict=True):
-        axes.plot(
-            *points.T, "-o", color="#c3ccd6", linewidth=7, markersize=9, markerfacecolor=QUIET, zorder=1
-        )
+        look: dict[str, Any] = {"color": "#c3ccd6", "linewidth": 7, "markersize": 9, "markerfacecolor": QUIET}
+        axes.plot(*points.T, "-o", zorder=1, **look)
         if reference == "world":
             axes.plot(*np.array([tip, at]).T, color=QUIET, linestyle=":", linewidth=1.2, zorder=0)
         _axes(axes, at, R)
@@ -76,9 +64,8 @@ def reference_frames() -> Any:
         # draw the two components of the arrow, along the two axes
         for k, color in enumerate((VERMILION, GREEN)):
             begin = at + (0.6 * R[:, 0] * numbers[0] if k else 0)
-            axes.plot(
-                *np.array([begin, begin + 0.6 * R[:, k] * numbers[k]]).T, color=color, linewidth=1.2, ls="--"
-            )
+            ends = np.array([begin, begin + 0.6 * R[:, k] * numbers[k]])
+            axes.plot(*ends.T, color=color, linewidth=1.2, ls="--")
         axes.set(xlim=(-0.35, 0.95), ylim=(-0.36, 0.8), xticks=(), yticks=())
         axes.set_aspect("equal")
         axes.spines[:].set_visible(False)
@@ -113,16 +100,14 @@ def photograph_viewer(folder: Path) -> None:
                 browser.chrome.get(server.address)
                 browser.wait("return document.querySelector('canvas') !== null")
                 time.sleep(30)  # shapes appear slowly without a GPU
-                browser.js(
-                    "document.querySelectorAll('[class*=Notification] button').forEach(b => b.click())"
-                )
+                notes = "document.querySelectorAll('[class*=Notification] button')"
+                browser.js(f"{notes}.forEach(b => b.click())")
                 if width < 600:
                     browser.wait("return document.getElementById('fold') !== null")
                     browser.js("document.getElementById('fold').click()")
                 time.sleep(5)
-                browser.js(
-                    "window.requestAnimationFrame = () => 0"
-                )  # drawing takes seconds: stop after the current picture
+                # Drawing takes seconds: stop after the current picture.
+                browser.js("window.requestAnimationFrame = () => 0")
                 time.sleep(2)
                 keep(browser, f"{name}{theme}")
     finally:

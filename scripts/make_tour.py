@@ -38,14 +38,9 @@ STYLE: Any = {
     "font.size": 10,
     "font.family": "sans-serif",
     "axes.edgecolor": QUIET,
-    "axes.labelcolor": INK,
     "axes.titlesize": 11,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
+    **dict.fromkeys(("axes.labelcolor", "text.color", "xtick.color", "ytick.color"), INK),
+    **dict.fromkeys(("axes.spines.top", "axes.spines.right", "legend.frameon"), False),
     "figure.facecolor": "white",
     "svg.hashsalt": "urdfkin",
     "svg.fonttype": "none",
@@ -54,27 +49,15 @@ STYLE: Any = {
 
 def arrow(axes: Any, start: FloatArray, vector: FloatArray, color: str, label: str | None = None) -> None:
     """Draw an arrow in the plane, in data units."""
-    axes.quiver(
-        *start,
-        *vector,
-        color=color,
-        angles="xy",
-        scale_units="xy",
-        scale=1,
-        width=0.007,
-        zorder=4,
-        label=label,
-    )
+    units: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1}
+    axes.quiver(*start, *vector, color=color, width=0.007, zorder=4, label=label, **units)
 
 
 def plane(axes: Any, title: str) -> None:
     """Set equal scales, a grid, and axis labels in metres."""
-    axes.set_aspect("equal")
     axes.grid(color="#e6eaee", linewidth=0.8)
     axes.set_axisbelow(True)
-    axes.set_title(title)
-    axes.set_xlabel("x0 [m]")
-    axes.set_ylabel("y0 [m]")
+    axes.set(aspect="equal", title=title, xlabel="x0 [m]", ylabel="y0 [m]")
 
 
 def one_link(figure: Any) -> None:
@@ -101,13 +84,8 @@ def velocity_field(figure: Any) -> None:
     field = turning_vector_rate(1.0 * k, points)
     speed = np.linalg.norm(field, axis=-1)
     colors = plt.get_cmap("viridis")(0.85 * speed.ravel() / speed.max())
-    axes.quiver(
-        *points.reshape(-1, 3).T,
-        *(0.35 * field.reshape(-1, 3)).T,
-        colors=colors,
-        arrow_length_ratio=0.3,
-        linewidth=1.4,
-    )
+    starts, vectors = points.reshape(-1, 3).T, (0.35 * field.reshape(-1, 3)).T
+    axes.quiver(*starts, *vectors, colors=colors, arrow_length_ratio=0.3, linewidth=1.4)
     axes.quiver(*(-k), *(2 * k), color=INK, arrow_length_ratio=0.06, linewidth=2)
     axes.text(*(1.08 * k), "w")
     circle = rotation_about(k, np.linspace(0, 2 * np.pi, 100)) @ np.array([0.9, -0.5, 0.0])
@@ -141,10 +119,8 @@ def integral_of_w(figure: Any) -> None:
         quats = integrate_orientation(turning(*order), [0.0, 0.0, 0.0, 1.0], np.linspace(0.0, 2.0, 201))
         for column, step in enumerate((0, 100, 200)):
             axes = figure.add_subplot(2, 3, 3 * row + column + 1, projection="3d")
-            for i in range(3):
-                axes.quiver(
-                    0, 0, 0, *(1.25 * np.eye(3)[i]), color="#cfd6dd", arrow_length_ratio=0.06, linewidth=1
-                )
+            for axis in 1.25 * np.eye(3):
+                axes.quiver(0, 0, 0, *axis, color="#cfd6dd", arrow_length_ratio=0.06, linewidth=1)
             draw_frame(axes, rotation_of(quats[step]), 1.0, "")
             path = rotation_of(quats[: step + 1])[:, :, 2]
             axes.plot(*path.T, color=BLUE, linewidth=1, linestyle=":")
@@ -162,23 +138,13 @@ def euler_singularity(figure: Any) -> None:
     """
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
-    for name, color, dashes, label in (
-        ("ZYZ", BLUE, "-", "ZYZ"), ("xyz", ORANGE, "--", "roll, pitch, yaw"),
-    ):  # fmt: skip
+    for name, color, dashes, label in (("ZYZ", BLUE, "-", "ZYZ"), ("xyz", ORANGE, "--", "roll, pitch, yaw")):
         turns = np.stack((np.zeros_like(middle), middle, np.zeros_like(middle)), axis=-1)
         good = np.abs(np.cos(middle) if name == "xyz" else np.sin(middle)) > 1e-9
-        axes.semilogy(
-            np.degrees(middle[good]),
-            euler_condition(name, turns[good]),
-            color=color,
-            linestyle=dashes,
-            label=label,
-            linewidth=2,
-        )
-    axes.set(
-        ylim=(0.9, 2e3), xlim=(0, 180), xlabel="middle angle [degrees]", ylabel="condition number of Omega"
-    )
-    axes.set_xticks(range(0, 181, 30))
+        degrees, condition = np.degrees(middle[good]), euler_condition(name, turns[good])
+        axes.semilogy(degrees, condition, color=color, linestyle=dashes, label=label, linewidth=2)
+    axes.set(xlabel="middle angle [degrees]", ylabel="condition number of Omega")
+    axes.set(ylim=(0.9, 2e3), xlim=(0, 180), xticks=range(0, 181, 30))
     axes.grid(color="#e6eaee", linewidth=0.8)
     axes.legend(loc="upper center", ncols=2)
     axes.set_title("7.56: singularities of Euler angle rates")
@@ -203,9 +169,8 @@ def convergence(figure: Any) -> None:
         errors.append(np.linalg.norm(log_rotation(rotation_of(quats[-1]).T @ end)))
     axes = figure.subplots()
     axes.loglog(2.0 / steps, errors, "o-", color=BLUE, linewidth=2, label="error at t = 2 s")
-    axes.loglog(
-        2.0 / steps, errors[-1] * (steps[-1] / steps) ** 4, "--", color=QUIET, label="step to the fourth"
-    )
+    fourth = errors[-1] * (steps[-1] / steps) ** 4
+    axes.loglog(2.0 / steps, fourth, "--", color=QUIET, label="step to the fourth")
     axes.set(xlabel="step [s]", ylabel="error of the orientation [rad]")
     axes.grid(color="#e6eaee", linewidth=0.8, which="both")
     axes.legend()
@@ -265,12 +230,8 @@ def two_link(figure: Any) -> None:
 def breakdown(figure: Any) -> None:
     """Draw the terms of the tool's acceleration, for each joint of the elbow robot."""
     robot = urdfkin.load("elbow")
-    q, v, a = (
-        [0.4, 0.5, 0.7, 0.3, 0.6, 0.2],
-        [1.0, 0.8, -1.2, 2.0, 1.0, -1.0],
-        [0.5, 1.0, -0.5, 1.0, 1.0, 1.0],
-    )
-    parts = robot.acceleration_breakdown(q, v, a, "tool")
+    q, v = [0.4, 0.5, 0.7, 0.3, 0.6, 0.2], [1.0, 0.8, -1.2, 2.0, 1.0, -1.0]
+    parts = robot.acceleration_breakdown(q, v, [0.5, 1.0, -0.5, 1.0, 1.0, 1.0], "tool")
     axes = figure.subplots(1, 3, sharey=True)
     colors, hatches = (BLUE, VERMILION, ORANGE, GREEN), ("", "////", "--", "\\\\\\\\")
     for component, panel in enumerate(axes):
@@ -278,11 +239,9 @@ def breakdown(figure: Any) -> None:
             above = below = 0.0
             for k, color in enumerate(colors):
                 value = float(parts.terms[j, k, component])
-                base = above if value >= 0 else below
-                panel.bar(
-                    j, value, bottom=base, color=color, width=0.7, hatch=hatches[k], edgecolor="white",
-                    linewidth=0, label=KINDS[k] if j == 0 else None,
-                )  # fmt: skip
+                look: dict[str, Any] = {"color": color, "hatch": hatches[k], "edgecolor": "white"}
+                look |= {"label": KINDS[k] if j == 0 else None, "width": 0.7, "linewidth": 0}
+                panel.bar(j, value, bottom=above if value >= 0 else below, **look)
                 above, below = (above + value, below) if value >= 0 else (above, below + value)
         panel.axhline(0, color=QUIET, linewidth=0.8)
         total = float(parts.total[component])

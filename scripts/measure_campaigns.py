@@ -1,10 +1,11 @@
-"""Measure the cost of a campaign in four variants: serial, two processes, with a store, on a local cluster.
-
-The variants alternate, so that other load of the machine affects all of them. The script prints medians
-over rounds. Processor time includes all processes, and hardly depends on other load.
+"""Measure the cost of a campaign: serial, with two processes, with a store, and on a local cluster.
 
     python scripts/measure_campaigns.py ur5 --samples 10000 --rounds 3
     python scripts/measure_campaigns.py --all --samples 1000 --rounds 1 --ways serial,jobs
+    python scripts/measure_campaigns.py --chunk     # compute, store, read and add one chunk of the UR5
+
+The variants alternate, so that other load of the machine affects all of them. The script prints medians
+over rounds. Processor time includes all processes, and hardly depends on other load.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from typing import Any
 
 from urdfkin.urdf.catalogue import examples
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import Cut
+from urdfkin.validation.chunk import Cut, run_chunk
 from urdfkin.validation.cluster import connected
+from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.results import ValidationReport
-
-Way = Callable[..., ValidationReport]
+from urdfkin.validation.robot_input import subject
+from urdfkin.validation.store import opened
 
 
 def store(*robots: Any, **how: Any) -> ValidationReport:
@@ -50,7 +52,7 @@ def cluster(*robots: Any, **how: Any) -> ValidationReport:
         return report
 
 
-WAYS: dict[str, Way] = {
+WAYS: dict[str, Callable[..., ValidationReport]] = {
     "serial": validate,
     "store": store,
     "jobs": lambda *robots, **how: validate(*robots, jobs=2, **how),
@@ -58,40 +60,70 @@ WAYS: dict[str, Way] = {
 }
 
 
-def main() -> None:
-    """Print the table of measurements."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("robots", nargs="*")
-    parser.add_argument("--all", action="store_true")
-    parser.add_argument("--samples", type=int, default=10_000)
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--ways", default=",".join(WAYS))
-    given = parser.parse_args()
-    robots = list(examples()) if given.all else given.robots
+def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> None:
+    """Validate robots in several ways, and print the times."""
     validate("planar_two_link", samples=10)  # compile and load all kernels before the measurement
-    wall: dict[str, list[float]] = {}
-    processor: dict[str, list[float]] = {}
-    for _ in range(given.rounds):
-        for name in given.ways.split(","):
+    wall: dict[str, list[float]] = {name: [] for name in ways}
+    processor: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(rounds):
+        for name in ways:
             begin, before = time.perf_counter(), _processor()
-            report = WAYS[name](robots, samples=given.samples)
-            wall.setdefault(name, []).append(time.perf_counter() - begin)
-            processor.setdefault(name, []).append(_processor() - before)
+            report = WAYS[name](robots, samples=samples)
+            wall[name].append(time.perf_counter() - begin)
+            processor[name].append(_processor() - before)
             results = sum(robot.results for robot in report.robots)
             print(f"  {name}: {wall[name][-1]:.1f} s, processor {processor[name][-1]:.1f} s", flush=True)
-    print(f"{len(robots)} robots, {given.samples:,} samples each, {results:,} results; {given.rounds} rounds")
-    for name, seconds in wall.items():
-        work = [p / s for p, s in zip(processor[name], processor["serial"], strict=True)]
-        each = (
-            f"{results / median(seconds):,.0f} results/s, {results / median(processor[name]):,.0f} a second"
-        )
-        print(f"{name}: {each} of processor; processor time {median(work):.3f} of serial")
+    print(f"{len(robots)} robots, {samples:,} samples each, {results:,} results; {rounds} rounds")
+    for name in ways:
+        a_second = [results / median(seconds[name]) for seconds in (wall, processor)]
+        share = median(p / s for p, s in zip(processor[name], processor[ways[0]], strict=True))
+        print(f"{name}: {a_second[0]:,.0f} results/s, {a_second[1]:,.0f} a second of processor;", end=" ")
+        print(f"processor time {share:.3f} of {ways[0]}")
 
 
 def _processor() -> float:
     """Return the processor time in seconds of this process and its finished children."""
-    t = os.times()
-    return t.user + t.system + t.children_user + t.children_system
+    return sum(os.times()[:4])
+
+
+def measure_chunk() -> None:
+    """Print the processor time to compute, store, read and add a chunk, in milliseconds."""
+    robot, cut = subject("ur5"), Cut(100_000)
+    chunk = cut.chunk(robot, 0, 1)
+    found = run_chunk(chunk)
+    print(f"a chunk of {chunk.configurations} samples: {_cost(lambda _: run_chunk(chunk), 3):.0f} ms")
+    manifest = Manifest.of([robot], cut.samples, 0, "now")
+    with tempfile.TemporaryDirectory() as folder, opened(Path(folder) / "s", manifest, print) as kept:
+        print(f"time to store it: {_cost(lambda i: kept.keep(0, i, found)):.2f} ms")
+        print(f"time to read it: {_cost(lambda i: kept.answer(0, i)):.2f} ms")
+    print(f"time to add two: {_cost(lambda _: found + found):.2f} ms")
+
+
+def _cost(work: Callable[[int], object], times: int = 100) -> float:
+    """Return the median processor time in milliseconds."""
+    seconds = []
+    for i in range(times):
+        begin = time.process_time()
+        work(i)
+        seconds.append(time.process_time() - begin)
+    return 1e3 * median(seconds)
+
+
+def main() -> None:
+    """Print the measurements."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("robots", nargs="*")
+    parser.add_argument("--all", action="store_true", help="the robots of example-robot-data")
+    parser.add_argument("--samples", type=int, default=10_000)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--ways", default=",".join(WAYS), help=f"default: {','.join(WAYS)}")
+    parser.add_argument("--chunk", action="store_true", help="measure the cost of one chunk")
+    given = parser.parse_args()
+    if given.chunk:
+        measure_chunk()
+        return
+    robots = list(examples()) if given.all else given.robots
+    measure(robots, given.ways.split(","), given.samples, given.rounds)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from statistics import median
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
-from tests.report.browser import Browser, opened
+from tests.report.browser import opened
 from urdfkin.report.html import as_files
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
@@ -47,7 +47,8 @@ def main() -> None:
         page, begin = Path(folder) / "fleet.html", time.process_time()
         (page.parent / "fleet-robots").mkdir()
         sizes = [
-            _write(page.parent / place, text) for place, text in as_files(fleet(given.robots), page.name)
+            (page.parent / place).write_text(text, encoding="utf-8")
+            for place, text in as_files(fleet(given.robots), page.name)
         ]
         print(f"written: {time.process_time() - begin:.1f} s of processor, {len(sizes)} files,", end=" ")
         print(f"the page {sizes[-1] / 1e6:.2f} MB, {sum(sizes) / 1e6:.0f} MB together")
@@ -69,10 +70,6 @@ def fleet(robots: int) -> Document:
     return document
 
 
-def _write(path: Path, text: str) -> int:
-    return path.write_text(text, encoding="utf-8")
-
-
 def _opened(page: Path, profile: Path, robots: int) -> dict[str, float]:
     with opened(profile) as browser:
         browser.chrome.get("about:blank")
@@ -82,12 +79,8 @@ def _opened(page: Path, profile: Path, robots: int) -> dict[str, float]:
             "loaded": browser.js(_READY),
             "one robot found": browser.js(_FIND, f"{robots - 1:04}"),
             "all found again": browser.js(_FIND, ""),
-            "one robot unfolded, its file read": _unfolded(browser, robots // 2),
+            "one robot unfolded, its file read": browser.chrome.execute_async_script(_UNFOLD, robots // 2),
         }
-
-
-def _unfolded(browser: Browser, robot: int) -> float:
-    return float(browser.chrome.execute_async_script(_UNFOLD, robot))
 
 
 if __name__ == "__main__":

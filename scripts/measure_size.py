@@ -22,10 +22,10 @@ except ModuleNotFoundError:  # without extras, pip contains the only copy of thi
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.pages import inserted
+from scripts.pages import DOCS, insert, table
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "install.md"
+PAGE = DOCS / "install.md"
 EXTRAS = ("plots", "view", "xacro", "mujoco", "descriptions", "cluster")
 
 
@@ -87,41 +87,36 @@ def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tupl
         " Pinocchio and its libraries, and the rest mostly for NumPy, Numba and its\ncompiler."
         f" {len(core) - len(lean)} packages ({meshes / 1e6:.0f} MB) come only with yourdfpy, which needs"
         " `trimesh[easy]`. A job that only\n[checks files](ci.md) needs urdfkin and click,"
-        f" {(own() + core['click']) / 1e6:.0f} MB.\n\n| extra | additional packages | size |\n|---|---|---|\n"
+        f" {(own() + core['click']) / 1e6:.0f} MB.\n\n"
     )
-    rows = (f"| `[{name}]` | {count} | {size / 1e6:.0f} MB |" for name, (count, size) in extras.items())
-    return text + "\n".join(rows)
+    rows = [(f"`[{name}]`", count, f"{size / 1e6:.0f} MB") for name, (count, size) in extras.items()]
+    return text + table(("extra", "additional packages", "size"), rows)
 
 
 def main() -> None:
     """Print the largest packages, the sums and the extras, and write the page."""
     parser = argparse.ArgumentParser(description="Measure the size of an installation.")
-    parser.add_argument(
-        "--print",
-        action="store_true",
-        dest="only_print",
-        help="print the sizes without writing them into the page",
-    )
-    options = parser.parse_args()
+    parser.add_argument("--print", action="store_true", help="print the sizes, and do not write the page")
+    only_print = vars(parser.parse_args())["print"]
     core = closure("urdfkin") | {"urdfkin": own()}
     lean = closure("urdfkin", without="yourdfpy") | {"urdfkin": own()}
     extras = installed_extras(core)
-    for name, size in sorted(core.items(), key=lambda item: -item[1])[:10]:
+    sizes = dict(sorted(core.items(), key=lambda item: -item[1])[:10]) | {
+        f"urdfkin and the {len(core) - 1} packages that it needs": sum(core.values()),
+        f"these without the packages of yourdfpy: {len(lean)} packages": sum(lean.values()),
+        "of these for pin, which is Pinocchio": sum(closure("pin").values()),
+        "urdfkin and click, which `urdfkin check` needs": own() + core["click"],
+        **{f"[{name}], {count} packages more": size for name, (count, size) in extras.items()},
+    }
+    for name, size in sizes.items():
         print(f"{size / 1e6:7.0f} MB  {name}")
-    print(f"{sum(core.values()) / 1e6:7.0f} MB  urdfkin and the {len(core) - 1} packages that it needs")
-    print(f"{sum(lean.values()) / 1e6:7.0f} MB  these without the packages of yourdfpy: {len(lean)} packages")
-    print(f"{sum(closure('pin').values()) / 1e6:7.0f} MB  of these for pin, which is Pinocchio")
-    print(f"{(own() + core['click']) / 1e6:7.0f} MB  urdfkin and click, which `urdfkin check` needs")
-    for name, (count, size) in extras.items():
-        print(f"{size / 1e6:7.0f} MB  [{name}], {count} packages more")
     print(f"only yourdfpy needs: {', '.join(sorted(core.keys() - lean.keys()))}")
-    if options.only_print:
+    if only_print:
         return
     if len(extras) < len(EXTRAS):
         missing = ", ".join(set(EXTRAS) - extras.keys())
         sys.exit(f"the page is not written: install these extras first: {missing}")
-    PAGE.write_text(inserted(PAGE.read_text("utf-8"), size=sentences(core, lean, extras)), "utf-8")
-    print(PAGE)
+    insert(PAGE, size=sentences(core, lean, extras))
 
 
 if __name__ == "__main__":

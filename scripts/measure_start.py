@@ -24,10 +24,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
-from scripts.pages import inserted
+from scripts.pages import DOCS, insert
+from scripts.pages import table as markdown
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "performance.md"
+PAGE = DOCS / "performance.md"
 _COMMAND = "import sys; sys.argv[0] = 'urdfkin'; from urdfkin.cli import main; main()"
 _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.neutral(), r.tip_frame)"
 BASE = ("-c", "import numpy, pinocchio")
@@ -35,20 +36,14 @@ BASE = ("-c", "import numpy, pinocchio")
 
 @dataclass(frozen=True)
 class Row:
-    """A process to measure.
+    """A process to measure."""
 
-    Attributes:
-        what: Name of the process on the page.
-        words: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
-        most: Limit of the time, in multiples of the time of `import numpy, pinocchio`. None: the time has no
-            limit.
-        fresh: Whether the process starts with an empty kernel cache.
-    """
-
-    what: str
+    what: str  # name of the process on the page
+    #: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
     words: tuple[str, ...]
+    #: Limit of the time, in multiples of the time of `import numpy, pinocchio`. None: the time has no limit.
     most: float | None = None
-    fresh: bool = False
+    fresh: bool = False  # whether the process starts with an empty kernel cache
     seconds: list[float] = field(default_factory=list, compare=False)
 
     @property
@@ -84,13 +79,7 @@ def seconds(words: Sequence[str], cache: str | None) -> float:
     if cache is not None:
         environ |= {"XDG_CACHE_HOME": cache, "NUMBA_CACHE_DIR": ""}
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(
-        [sys.executable, *words],
-        env=environ,
-        check=True,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    subprocess.run([sys.executable, *words], env=environ, check=True, capture_output=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
@@ -113,11 +102,12 @@ def measured(rounds: int, folder: Path) -> list[Row]:
 
 def table(found: Sequence[Row]) -> str:
     """Return the table of the page."""
-    lines = ["|  | processor time, s | times `import numpy, pinocchio` | at most |", "|---|---:|---:|---:|"]
-    for row in found:
-        most = "" if row.most is None else f"{row.most:.1f}"
-        lines.append(f"| {row.what} | {row.median:.2f} | {row.median / found[0].median:.2f} | {most} |")
-    return "\n".join(lines)
+    base = found[0].median
+    rows = [
+        (row.what, f"{row.median:.2f}", f"{row.median / base:.2f}", f"{row.most:.1f}" if row.most else "")
+        for row in found
+    ]
+    return markdown(("", "processor time, s", "times `import numpy, pinocchio`", "at most"), rows, left=1)
 
 
 def missed(found: Sequence[Row]) -> list[str]:
@@ -135,7 +125,7 @@ def main(words: Sequence[str] | None = None) -> int:
         found = measured(given.rounds, Path(folder))
     figures = table(found)
     print(figures)
-    PAGE.write_text(inserted(PAGE.read_text("utf-8"), start=figures), "utf-8")
+    insert(PAGE, start=figures)
     for what in missed(found):
         print(f"too slow: {what}", file=sys.stderr)
     return int(bool(missed(found)))

@@ -6,8 +6,9 @@
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_slips.toml
 
 The script runs the quick tests near the mutated file. With --slow it then runs the slow tests near this file,
-and with --whole the whole test suite. The script prints every undetected mutant, and writes all results to
---json. Mutants that docs/mutation.md lists as harmless are skipped. Exit 0: all mutants are detected or
+and with --whole the whole test suite. The script prints every undetected mutant. Mutants that
+docs/mutation.md lists as harmless are skipped. In the past, no test detected the named mutants. A named
+mutant replaces a text of a file, and one given test must now fail. Exit 0: all mutants are detected or
 harmless. 1: some mutants are not detected, or there is no mutant. 2: a part does not exist.
 """
 
@@ -19,44 +20,140 @@ import json
 import multiprocessing
 import os
 import random
+import re
 import runpy
 import sys
 import tempfile
-import time
+import tomllib
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
-from functools import partial
+from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 from scripts.mutating.operators import function_at, slips
-from scripts.mutating.selection import ROOT, Named, argued, files, module_of, named_slips, near_tests
 
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # pytest's exit code if no test was collected
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
+
+# -- the files, their tests, and the lists of mutants ------------------------------------------------------
+
+#: Numba compiles these files from their source, so a mutant made on import has no effect.
+#: tests/laws/test_mutation.py mutates them without the compiler.
+_COMPILED = {
+    "numbers", "registers", "sine", "memory", "walk", "outputs", "cores", "single", "equations", "worst",
+}  # fmt: skip
+
+
+#: Tests that make their own mutants in separate processes.
+_OF_SLIPS = ("test_mutate", "test_named_slips")
+_OF_ROBOTS = ("test_robot.py", "verify", "laws")
+
+
+def files(parts: list[str]) -> list[Path]:
+    """Return the package's files, or only the files whose path in the package begins with one of the parts.
+
+    Raises:
+        ValueError: no path begins with one of the parts.
+    """
+    found = sorted(path for path in PACKAGE.rglob("*.py") if path.stem not in _COMPILED)
+    for part in parts:
+        if not any(_below(path).startswith(part) for path in found):
+            raise ValueError(f"{part}: no file below {PACKAGE.name}/ that can be mutated begins so")
+    return [path for path in found if not parts or _below(path).startswith(tuple(parts))]
+
+
+def module_of(path: Path) -> str:
+    """Return the module of a file, such as `urdfkin.dh.parse_table`."""
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def _below(path: Path) -> str:
+    return str(path.relative_to(PACKAGE))
+
+
+def near_tests(path: Path) -> list[str]:
+    """Return the tests near a module: first the tests that mention the module, then the tests of its package.
+
+    If a part of the package has no tests of its own, the tests of all other parts are returned.
+    """
+    package, _, name = module_of(path).rpartition(".")
+    named = re.compile(
+        rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
+    )
+    part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    near = {
+        test
+        for test, text in _texts().items()
+        if test.stem == f"test_{path.stem}" or (name in text and named.search(text))
+    }
+    own = _tests_of(part, f"test_{part}.py") or _tests_of(*_OF_ROBOTS)
+    order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
+    return [str(test.relative_to(ROOT)) for test in order]
+
+
+def _tests_of(*parts: str) -> set[Path]:
+    return {test for test in _texts() if test.relative_to(TESTS).parts[0] in parts}
+
+
+@cache
+def _texts() -> dict[Path, str]:
+    tests = (path for path in TESTS.rglob("test_*.py") if path.stem not in _OF_SLIPS)
+    return {path: path.read_text(encoding="utf-8") for path in tests}
+
+
+@dataclass(frozen=True)
+class Named:
+    """One named mutant."""
+
+    claim: str  # the mistake that must be detected
+    module: str  # the module, such as `urdfkin.validation.error_stats`
+    before: str  # a text that occurs exactly once in the module
+    after: str  # the text that replaces `before`
+    test: str  # the test that fails with the mutant and passes without it
+
+    @property
+    def file(self) -> Path:
+        """Path of the module's file."""
+        path = ROOT / self.module.replace(".", "/")
+        return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def named_slips() -> list[Named]:
+    """Return the mutants of tests/attacks/named_slips.toml."""
+    text = (TESTS / "attacks" / "named_slips.toml").read_text(encoding="utf-8")
+    return [Named(**slip) for slip in tomllib.loads(text)["slip"]]
+
+
+#: Pattern of a line such as "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
+_ARGUMENT = re.compile(r"^- `(?P<place>[\w.]+)`: `(?P<what>[^`]+)`: (?P<why>\S.+)$", re.MULTILINE)
+
+
+@cache
+def argued() -> dict[tuple[str, str], str]:
+    """Return the reason of each harmless mutant, by its function and its text."""
+    page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
+    return {(found["place"], found["what"]): found["why"] for found in _ARGUMENT.finditer(page)}
+
+
+# -- mutants, and the tests that must detect them ---------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A change of a file that introduces a mistake, which a test should detect.
+    """A change of a file that introduces a mistake, which a test should detect."""
 
-    Attributes:
-        name: Name for --only.
-        file: The file.
-        line: The line.
-        what: The text before and after.
-        place: The function of the mutant; it identifies the mutant even after other changes of the file.
-    """
-
-    name: str
-    file: str
-    line: int
-    what: str
-    place: str
+    name: str  # name for --only
+    file: str  # the file
+    line: int  # the line
+    what: str  # the text before and after
+    place: str  # the function of the mutant; it identifies the mutant even after other changes of the file
 
 
 @dataclass(frozen=True)
@@ -66,7 +163,6 @@ class Outcome:
     mutant: Mutant
     word: str
     by: str
-    seconds: float
 
 
 def mutants(parts: list[str]) -> list[Mutant]:
@@ -91,26 +187,24 @@ def mutants_of(path: Path) -> list[Mutant]:
 
 def judge(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
     """Run the tests on a mutant until one fails."""
-    begin = time.perf_counter()
     near = near_tests(ROOT / mutant.file)
     rounds = [(near, _QUICK), *([(near, _SLOW)] if slow else []), *([(["tests"], _QUICK)] if whole else [])]
     for tests, marks in rounds:
         word, by = _run({"URDFKIN_MUTANT": mutant.name}, [*tests, "-m", marks], timeout)
         if word != "survived":
             break
-    return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
+    return Outcome(mutant, word, by)
 
 
 def judge_named(slip: Named, *, timeout: float) -> Outcome:
     """Run the test that must fail for this mutant."""
-    begin = time.perf_counter()
     texts = json.dumps([slip.before, slip.after])
     word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):
         word = "not run"  # the test failed for another reason than the mutant
     file = slip.file.relative_to(ROOT).as_posix()
     mutant = Mutant(slip.claim, file, 0, f"{slip.before}  ->  {slip.after}", slip.module)
-    return Outcome(mutant, word, by, round(time.perf_counter() - begin, 1))
+    return Outcome(mutant, word, by)
 
 
 #: A server that forks a process for each run of tests.
@@ -157,30 +251,18 @@ def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
 
 def main() -> int:
     """Run the mutation tests from the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "parts", nargs="*", help="prefixes of paths below urdfkin/, such as dh/ (default: all files)"
-    )
-    parser.add_argument("--sample", type=int, help="number of randomly chosen mutants (default: all mutants)")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument(
-        "--timeout", type=float, default=300.0, help="time limit of one mutant's tests in seconds"
-    )
-    parser.add_argument(
-        "--slow",
-        action="store_true",
-        help="also run the slow tests that mention the mutated module or belong to its package",
-    )
-    parser.add_argument("--whole", action="store_true", help="also run all tests that are not slow")
-    parser.add_argument("--only", help="run only the mutant with this name")
-    parser.add_argument(
-        "--named", action="store_true", help="run only the mutants listed by name, each with its own test"
-    )
-    parser.add_argument("--count", action="store_true", help="print the number of mutants and exit")
-    parser.add_argument("--json", type=Path, help="file for the results of all mutants")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    option = parser.add_argument
+    option("parts", nargs="*", help="prefixes of paths below urdfkin/, such as dh/ (default: all files)")
+    option("--sample", type=int, help="number of randomly chosen mutants (default: all mutants)")
+    option("--seed", type=int, default=0)
+    option("--jobs", type=int, default=1)
+    option("--timeout", type=float, default=300.0, help="time limit of one mutant's tests in seconds")
+    option("--slow", action="store_true", help="also run the slow tests near the mutated file")
+    option("--whole", action="store_true", help="also run all tests that are not slow")
+    option("--only", help="run only the mutant with this name")
+    option("--named", action="store_true", help="run only the named mutants, each with its own test")
+    option("--count", action="store_true", help="print the number of mutants and exit")
     options = parser.parse_args()
     try:
         asks = _asks(options)
@@ -192,20 +274,15 @@ def main() -> int:
     if options.count:
         print(len(asks))
         return 0
-    outcomes = []
+    counts = Counter[str]()
     with ThreadPoolExecutor(options.jobs) as pool:
         for outcome in pool.map(lambda ask: ask(), asks):
-            outcomes.append(outcome)
+            counts[outcome.word] += 1
             if outcome.word != "noticed":
                 mutant = outcome.mutant
-                print(
-                    f"{outcome.word}: {mutant.place}:{mutant.line}: {mutant.what}  [{mutant.name}]",
-                    flush=True,
-                )
-            if options.json is not None:
-                options.json.write_text(json.dumps([asdict(o) for o in outcomes], indent=1), "utf-8")
-    counts = Counter(outcome.word for outcome in outcomes)
-    print(f"{len(outcomes)} mutants: " + ", ".join(f"{n} {word}" for word, n in counts.most_common()))
+                where = f"{mutant.place}:{mutant.line}: {mutant.what}  [{mutant.name}]"
+                print(f"{outcome.word}: {where}", flush=True)
+    print(f"{len(asks)} mutants: " + ", ".join(f"{n} {word}" for word, n in counts.most_common()))
     return 0 if counts.keys() <= {"noticed", "argued"} else 1
 
 
@@ -229,7 +306,7 @@ def _chosen(options: argparse.Namespace) -> list[Mutant]:
 
 def _unless_argued(mutant: Mutant, **how: Any) -> Outcome:
     if (mutant.place, mutant.what) in argued():
-        return Outcome(mutant, "argued", "docs/mutation.md", 0.0)
+        return Outcome(mutant, "argued", "docs/mutation.md")
     return judge(mutant, **how)
 
 

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
 def inserted(page: str, **parts: str) -> str:
@@ -23,3 +27,22 @@ def inserted(page: str, **parts: str) -> str:
         if count != 1:
             raise ValueError(f"the page has {count} places <!-- {name} -->")
     return page
+
+
+def insert(path: Path, **parts: str) -> None:
+    """Insert the parts into a page, write the page, and print its path."""
+    path.write_text(inserted(path.read_text("utf-8"), **parts), "utf-8")
+    print(path)
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[object]], left: int | None = None) -> str:
+    """Return a Markdown table; the columns after the first `left` ones are right-aligned.
+
+    >>> print(table(("robot", "joints"), [("ur5", 6)], left=1))
+    | robot | joints |
+    |---|---:|
+    | ur5 | 6 |
+    """
+    marks = "".join("|---" if left is None or i < left else "|---:" for i in range(len(heads))) + "|"
+    lines = [f"| {' | '.join(map(str, row))} |" for row in (heads, *rows)]
+    return "\n".join([lines[0], marks, *lines[1:]])

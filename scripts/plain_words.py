@@ -51,17 +51,11 @@ _FILES_SKIPPED = {"CHANGELOG.md", "plain_words.py"}
 
 
 class Passage(NamedTuple):
-    """A piece of text for people, such as a line of a page, a docstring or a comment.
+    """A piece of text for people, such as a line of a page, a docstring or a comment."""
 
-    Attributes:
-        file: The file, relative to the repository.
-        line: First line of the passage.
-        text: Words of the passage.
-    """
-
-    file: str
-    line: int
-    text: str
+    file: str  # the file, relative to the repository
+    line: int  # first line of the passage
+    text: str  # words of the passage
 
 
 def passages(path: Path) -> Iterator[Passage]:
@@ -119,9 +113,8 @@ def long_sentences(paths: list[Path]) -> list[str]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "paths", nargs="*", type=Path, default=[ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md"]
-    )
+    default = [ROOT / "urdfkin", ROOT / "docs", ROOT / "README.md"]
+    parser.add_argument("paths", nargs="*", type=Path, default=default)
     parser.add_argument("--long", action="store_true", help="list long sentences instead")
     options = parser.parse_args()
     chosen = [path.resolve() for path in options.paths]

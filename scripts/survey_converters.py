@@ -2,13 +2,13 @@
 
 To MJCF, MuJoCo compiles the URDF and writes the model:
 
-    python scripts/survey_converters.py mujoco [ROBOT...] [--markdown TABLE.md]
+    python scripts/survey_converters.py mujoco [ROBOT...]
 
 To USD, Newton's urdf-usd-converter writes a stage. It needs the library usd-exchange, whose modules have the
 names of usd-core's, so it belongs in an environment of its own:
 
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
-    python scripts/survey_converters.py CONVERTER/bin/python [ROBOT...] [--markdown TABLE.md]
+    python scripts/survey_converters.py CONVERTER/bin/python [ROBOT...]
 
 Shapes are removed first: a converter would look for meshes. MuJoCo refuses a moving body without mass, so it
 is told to give such a body a small one, and to correct impossible inertias.
@@ -21,13 +21,13 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 import urdfkin
+from scripts.pages import table
 from urdfkin.comparison.result import Sameness, Verdict, angle, length
 from urdfkin.urdf.catalogue import catalogue
 
@@ -118,29 +118,17 @@ def _loaded(file: Path) -> urdfkin.Robot:
     return urdfkin.load(file, articulation=f"/{file.stem}")
 
 
-def rows(tool: str, names: list[str]) -> Iterator[tuple[str, str, str, str, str]]:
-    """Yield the row of each robot."""
-    for name in names:
-        yield row_of(tool, name)
-
-
 def main() -> None:
-    """Print the table; write it as Markdown if asked."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    """Print the table in Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("tool", help="mujoco, or the interpreter of the environment with urdf-usd-converter")
     parser.add_argument("robots", nargs="*", help="names of the catalogue (default: all)")
-    parser.add_argument("--markdown", type=Path, help="also write the table to this file")
     given = parser.parse_args()
     last = "angle" if given.tool == "mujoco" else "single precision allows"
     heads = ("robot", "moving joints", "verdict", "at most apart", last)
-    table = [f"| {' | '.join(heads)} |", "|---|---|---|---|---|"]
-    for row in rows(given.tool, given.robots or list(catalogue())):
-        table.append(f"| {' | '.join(row)} |")
-        print(table[-1], flush=True)
-    if given.markdown:
-        given.markdown.write_text("\n".join(table) + "\n")
+    print(table(heads, []))
+    for name in given.robots or list(catalogue()):
+        print(f"| {' | '.join(row_of(given.tool, name))} |", flush=True)
 
 
 if __name__ == "__main__":

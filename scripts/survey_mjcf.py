@@ -31,41 +31,23 @@ def said_of(path: Path) -> str:
         return "not verified"
     shapes, _, said = certificate.reading.partition("Pinocchio's MJCF reader")
     whole = ", without its shapes" if "does not compile" in shapes else ""
-    for words in (
-        "agrees on the bodies",
-        "disagrees",
-        "does not accept",
-        "other joints",
-        "no such body",
-    ):
+    for words in ("agrees on the bodies", "disagrees", "does not accept", "other joints", "no such body"):
         if words in said:
             return f"verified{whole}; Pinocchio's MJCF reader: {words}"
     return f"verified{whole}; {said}"
 
 
-def main() -> int:
+def main() -> None:
     """Run the survey from the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--each", action="store_true", help="print a line for each file")
-    options = parser.parse_args()
+    folder: Path = parser.parse_args().folder
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-    counts = Counter[str]()
-    for path in sorted(options.folder.rglob("*.xml")):
-        takes = is_mjcf(path)
-        if not takes:
-            continue
-        said = said_of(path)
-        counts[said] += 1
-        if options.each:
-            print(f"{path.relative_to(options.folder)}: {said}")
+    counts = Counter(said_of(path) for path in sorted(folder.rglob("*.xml")) if is_mjcf(path))
     for said, count in counts.most_common():
         print(f"{count:5d}  {said}")
     print(f"{sum(counts.values()):5d}  files")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

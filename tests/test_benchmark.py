@@ -14,14 +14,12 @@ import pytest
 
 import urdfkin
 from scripts import benchmark
-from scripts.benchmarking import generated, where
-from scripts.benchmarking.calls import Calls
-from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
+from scripts.benchmarking import generated, sections
+from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender, breadth_first, positions, spread
 from scripts.benchmarking.machine import EMPTY, KEPT, USES
-from scripts.benchmarking.peers import breadth_first, positions, spread
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, bare_urdf, chain_urdf
 from scripts.benchmarking.tables import tables
-from scripts.benchmarking.timing import DifferenceError, Table, Work, agree, measure
+from scripts.benchmarking.timing import Calls, DifferenceError, Table, Work, agree, measure
 from urdfkin.compiled.plan import Step, program_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -123,16 +121,13 @@ def test_the_path_written_out_for_one_robot_has_the_robots_jacobian_and_accelera
     with Subject(name, frame, 1) as subject:
         q, v, a = subject.q[0], subject.v[0], subject.a[0]
         of_q, of_v = (subject.plan.steps[:, place] for place in (Step.Q, Step.V))
-        x = q[of_q].tolist()
-        sines, cosines = np.sin(x).tolist(), np.cos(x).tolist()
-        J = np.zeros((6, subject.nv))
-        columns = generated.columns(subject.plan, x, sines, cosines)
-        J[:, of_v] = np.array([[*linear, *angular] for linear, angular in columns]).T
+        x, rates = q[of_q].tolist(), (v[of_v].tolist(), a[of_v].tolist())
+        numbers = [np.sin(x).tolist(), np.cos(x).tolist(), *rates]
+        J = np.reshape(generated.results(subject.plan, "jacobian", x, *numbers), (6, subject.nv))
         np.testing.assert_allclose(J, subject.robot.jacobian(q, frame), rtol=0, atol=1e-13)
-        rates = v[of_v].tolist(), a[of_v].tolist()
-        linear, angular = generated.acceleration(subject.plan, x, sines, cosines, *rates)
+        six = generated.results(subject.plan, "acceleration", x, *numbers)
         acceleration = subject.robot.acceleration(q, v, a, frame)
-        np.testing.assert_allclose([*linear, *angular], acceleration, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(six, acceleration, rtol=0, atol=1e-11)
 
 
 @pytest.mark.long
@@ -157,14 +152,14 @@ def test_code_generated_for_one_robot_computes_what_the_robot_does_and_writes_no
 def test_a_batch_taken_apart_is_whole_when_nothing_is_left_out(quantity: str) -> None:
     with Subject(*SUBJECTS[0], 9) as subject:
         program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
-        sizes = [where.cut(program, end) for end in range(1, len(where.PARTS) + 1)]
+        sizes = [sections.cut(program, end) for end in range(1, len(sections.PARTS) + 1)]
         np.testing.assert_array_equal(sizes[-1].words, program.words)
         lengths = [len(part.words) for part in sizes]
         assert lengths == sorted(lengths)
         assert lengths[0] < lengths[-1]
         (entry,) = [
             entry
-            for entry in where.parts_of_batches(100, 1)
+            for entry in sections.parts_of_batches(100, 1)
             if (entry["robot"], entry["quantity"]) == (subject.name, quantity)
         ]
         assert ("columns" in entry["parts"]) == (quantity == "jacobian")

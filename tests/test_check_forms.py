@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from scripts.check_forms import Subject, subject
-from scripts.forms.running import RUN, Missing, too_wide
+from scripts.check_forms import RUN, Missing, Subject, subject, too_wide
 from urdfkin.dh import export
 
 pytestmark = pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import pkgutil
 import re
 import shlex
@@ -10,12 +9,11 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 import urdfkin
-from scripts import check_exports, measure_size
+from scripts import check_exports, make_pages, measure_size
 from scripts.benchmarking.operations import operations
 from scripts.pages import inserted
 from tests.cli.running import urdfkin as run
@@ -28,18 +26,9 @@ DOCS = [f"docs/{page}" for page in pages()]
 PAGES = [*DOCS, "docs/examples/robots.yml", "README.md"]
 
 
-def script(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "scripts" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_the_layout_on_the_page_is_the_schemas() -> None:
-    maker = script("make_reports")
-    assert maker.PAGE.read_text("utf-8") == maker.page(), "run python scripts/make_reports.py"
+    page = make_pages.path_of("reports").read_text("utf-8")
+    assert page == make_pages.page("reports"), "run python scripts/make_pages.py reports"
 
 
 def commands() -> list[tuple[str, str]]:
@@ -92,7 +81,9 @@ def test_every_script_that_writes_a_page_is_run_by_make_docs() -> None:
     target = re.findall(r"^docs:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text("utf-8"), re.M)[0]
     run_by_make = set(re.findall(r"python scripts/(\w+)\.py", target))
     writers = {
-        path.stem for path in (ROOT / "scripts").glob("*.py") if "PAGE.write_text" in path.read_text("utf-8")
+        path.stem
+        for path in (ROOT / "scripts").glob("*.py")
+        if re.search(r"PAGE\.write_text|insert\(PAGE", path.read_text("utf-8"))
     }
     makers = {path.stem for path in (ROOT / "scripts").glob("make_*.py")}
     assert run_by_make == writers | makers - {"make_pictures"}  # photographs need a browser

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from scripts.mutate import Mutant, judge, main, mutants
+from scripts.mutate import PACKAGE, ROOT, Mutant, argued, files, judge, main, module_of, mutants, near_tests
 from scripts.mutating.operators import function_at, mutated, slips
-from scripts.mutating.selection import PACKAGE, ROOT, argued, files, module_of, near_tests
 
 SOURCE = '''
 """A text is left alone: 1 < 2."""

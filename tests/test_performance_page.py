@@ -5,21 +5,21 @@ import re
 
 import pytest
 
-from scripts import make_performance as maker
-from scripts.benchmarking.tables import number, tables
+from scripts import make_pages as maker
+from scripts.benchmarking.tables import NOT_MEASURED, number, page, tables
 
-TEXT = maker.PAGE.read_text("utf-8")
+TEXT = maker.path_of("performance").read_text("utf-8")
 FIGURES = json.loads(maker.FIGURES.read_text("utf-8"))
 
 
 def test_the_page_shows_the_figures_of_its_file() -> None:
-    assert maker.page(TEXT, FIGURES) == TEXT, "run python scripts/make_performance.py"
+    assert maker.page("performance") == TEXT, "run python scripts/make_pages.py performance"
 
 
 def test_another_figure_gives_another_page() -> None:
     first, *others = FIGURES["rows"]
     changed = {**FIGURES, "rows": [{**first, "median_ns": 12_345.0}, *others]}
-    assert "| 12,345 |" in maker.page(TEXT, changed)
+    assert "| 12,345 |" in page(TEXT, changed)
 
 
 def test_the_first_table_tells_all_threads_from_code_compiled_for_one_robot() -> None:
@@ -40,7 +40,7 @@ def test_the_first_table_tells_all_threads_from_code_compiled_for_one_robot() ->
 
 def test_figures_without_a_place_are_refused() -> None:
     with pytest.raises(ValueError, match="places for"):
-        maker.page(TEXT.replace("<!-- figures: floor -->", ""), FIGURES)
+        page(TEXT.replace("<!-- figures: floor -->", ""), FIGURES)
 
 
 def test_no_figure_is_typed() -> None:
@@ -55,8 +55,8 @@ def test_the_picture_is_light() -> None:
 
 def test_what_was_not_measured_is_said_to_be_missing() -> None:
     without = {**FIGURES, "rows": [row for row in FIGURES["rows"] if row["section"] != "sizes"]}
-    place = maker.page(TEXT, without).partition("<!-- figures: sizes -->\n")[2]
-    assert place.startswith(maker.NOT_MEASURED)
+    place = page(TEXT, without).partition("<!-- figures: sizes -->\n")[2]
+    assert place.startswith(NOT_MEASURED)
 
 
 def test_the_page_shows_where_the_time_of_a_batch_and_of_a_single_call_goes() -> None:
@@ -70,5 +70,4 @@ def test_the_page_shows_where_the_time_of_a_batch_and_of_a_single_call_goes() ->
         }
         for kind in ("batch", "single")
     ]
-    page = maker.page(TEXT, {**FIGURES, "where": where})
-    assert page.count("| walk | 10.0 (25 %) |") == 2
+    assert page(TEXT, {**FIGURES, "where": where}).count("| walk | 10.0 (25 %) |") == 2

@@ -25,6 +25,8 @@ from scripts.benchmarking.timing import Work
 from urdfkin.compiled import python_numbers
 from urdfkin.compiled.plan import CompiledTree, Motion, Step
 from urdfkin.kinematics import equations
+from urdfkin.model.recursion import Column, Recursion, State
+from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
 GENERATED = "generated for this robot, 1 thread"
@@ -35,71 +37,47 @@ _FLAGS = ("-std=gnu11", "-O3", "-march=native", "-shared", "-fPIC")
 
 # -- the equations along one path ------------------------------------------------------------------------
 
+_Z = (0.0, 0.0, 1.0)
 
-def columns(
-    plan: CompiledTree, x: Any, sines: Any, cosines: Any, eq: Any = equations
-) -> Iterator[tuple[Any, Any]]:
-    """Compute 7.85 in the world's axes: (linear, angular) columns of each joint of the path.
+
+def results(
+    plan: CompiledTree, quantity: str, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
+) -> list[Any]:
+    """Compute a quantity of one frame in LOCAL_WORLD_ALIGNED; return its numbers, row by row.
+
+    Jacobians (7.85) are computed in the world's axes, accelerations (7.127 to 7.130) in each link's axes.
 
     Args:
-        plan: The compiled tree of one frame.
+        plan: The compiled tree of one frame, whose joints have one coordinate each.
+        quantity: "jacobian" or "acceleration".
         x: The coordinate of each joint, which may be any kind of number, such as a float or a symbol.
         sines: The sine of each coordinate.
         cosines: The cosine of each coordinate.
+        v: The velocity of each joint.
+        a: The acceleration of each joint.
         eq: The textbook's equations, implemented for the same kind of number.
     """
-    R, p, passed = np.eye(3).tolist(), [0.0] * 3, []
-    for i, motion in enumerate(_motions(plan)):
-        S, d = _pose(plan.geometry[i])
-        p = eq.point_position(p, R, d)
-        R = eq.product(R, S)
-        z = eq.rotate(R, _Z)
-        passed.append((motion, z, p))
-        if motion is Motion.TURN:
-            R = eq.product(R, eq.about_z(sines[i], cosines[i], 0.0, 1.0))
+    recursion, state, columns = Recursion(eq, own=quantity == "acceleration"), State(), []
+    for i, (kind, _, place) in enumerate(plan.steps.tolist()):
+        R, d = _pose(plan.geometry[i])
+        state = recursion.turned(recursion.carried(state, d), R)
+        turns = Motion(kind) is Motion.TURN
+        columns.append(Column(eq.rotate(state.R, _Z), turns, state, i, place, 1.0))
+        if turns:
+            S = eq.about_z(sines[i], cosines[i], 0.0, 1.0)
+            state = recursion.revolute(state, _Z, S, v[i], a[i])
+        elif Motion(kind) is Motion.SLIDE:
+            state = recursion.prismatic(state, _Z, x[i], v[i], a[i])
         else:
-            p = eq.plus(p, eq.times(x[i], z))
-    end = eq.point_position(p, R, _pose(plan.offsets[0])[1])
-    for motion, z, p in passed:
-        yield eq.turning_column(z, eq.minus(end, p)) if motion is Motion.TURN else (z, [0.0] * 3)
+            raise ValueError("a joint with more than one coordinate")
+    state = recursion.carried(state, _pose(plan.offsets[0])[1])
+    if quantity == "acceleration":
+        return [*eq.rotate(state.R, state.acc), *eq.rotate(state.R, state.alpha)]
+    J = recursion.jacobian(state, columns, plan.nv, Reference.LOCAL_WORLD_ALIGNED)
+    return [number for row in zip(*J, strict=True) for number in row]
 
 
-def acceleration(
-    plan: CompiledTree, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
-) -> tuple[Any, Any]:
-    """Compute 7.127 to 7.130 in each link's axes, like urdfkin; return (linear, angular) in world axes."""
-    R, w, alpha, acc = np.eye(3).tolist(), [0.0] * 3, [0.0] * 3, [0.0] * 3
-
-    def turned(S: Any) -> tuple[Any, ...]:
-        back = eq.transposed(S)
-        return eq.product(R, S), *(eq.rotate(back, vector) for vector in (w, alpha, acc))
-
-    for i, motion in enumerate(_motions(plan)):
-        S, d = _pose(plan.geometry[i])
-        acc = eq.point_acceleration(acc, alpha, w, d)
-        R, w, alpha, acc = turned(S)
-        if motion is Motion.TURN:
-            alpha = eq.angular_acceleration(alpha, w, _Z, v[i], a[i])
-            w = eq.angular_velocity(w, _Z, v[i])
-            R, w, alpha, acc = turned(eq.about_z(sines[i], cosines[i], 0.0, 1.0))
-        else:
-            acc = eq.point_acceleration(acc, alpha, w, eq.times(x[i], _Z))
-            acc = eq.sliding_acceleration(acc, w, _Z, v[i], a[i])
-    acc = eq.point_acceleration(acc, alpha, w, _pose(plan.offsets[0])[1])
-    return eq.rotate(R, acc), eq.rotate(R, alpha)
-
-
-_Z = [0.0, 0.0, 1.0]
-
-
-def _motions(plan: CompiledTree) -> list[Motion]:
-    found = [Motion(kind) for kind in plan.steps[:, Step.KIND].tolist()]
-    if set(found) - {Motion.TURN, Motion.SLIDE}:
-        raise ValueError("a joint with more than one coordinate")
-    return found
-
-
-def _pose(row: FloatArray) -> tuple[list[list[float]], list[float]]:
+def _pose(row: FloatArray) -> tuple[Any, Any]:
     """Return the constant rotation R and translation p in a row of a compiled tree."""
     return row[:9].reshape(3, 3).tolist(), row[9:12].tolist()
 
@@ -127,20 +105,16 @@ def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
         subprocess.CalledProcessError: the compiler rejects the code.
     """
     plan, folder = subject.plan, subject.folder
-    sizes = {"NQ": plan.nq, "NV": plan.nv, "STEPS": len(plan.steps), "RESULTS": subject.numbers(quantity)}
-    sizes["MOVING"] = int(quantity == "acceleration")
-    tables = {
-        "Q_AT": plan.steps[:, Step.Q],
-        "V_AT": plan.steps[:, Step.V],
-        "TURNS": plan.steps[:, Step.KIND] == Motion.TURN,
+    turns = plan.steps[:, Step.KIND] == Motion.TURN
+    tables = {"Q_AT": plan.steps[:, Step.Q], "V_AT": plan.steps[:, Step.V], "TURNS": turns.astype(int)}
+    macros = {
+        **{"NQ": plan.nq, "NV": plan.nv, "STEPS": len(plan.steps), "RESULTS": subject.numbers(quantity)},
+        **{"MOVING": int(quantity == "acceleration"), "PI_2_REST": python_numbers.PI_2_REST},
+        **{name: _listed(getattr(python_numbers, name)) for name in ("SINE", "COSINE")},
     }
-    lines = [f"#define {name} {size}" for name, size in sizes.items()]
-    lines += [
-        f"static const int {name}[] = {{{_listed(column.astype(int).tolist())}}};"
-        for name, column in tables.items()
-    ]
-    lines += [f"#define {name} {_listed(getattr(python_numbers, name))}" for name in ("SINE", "COSINE")]
-    lines += [f"#define PI_2_REST {python_numbers.PI_2_REST}", _straight_line(plan, quantity)]
+    lines = [f"#define {name} {value}" for name, value in macros.items()]
+    lines += [f"static const int {name}[] = {{{_listed(at.tolist())}}};" for name, at in tables.items()]
+    lines.append(_straight_line(plan, quantity))
     (folder / f"{quantity}.h").write_text("\n".join(lines), "utf-8")
     library = folder / f"{quantity}.so"
     here = [f"-I{folder}", f'-DROBOT="{quantity}.h"', str(_FRAME), "-o", str(library)]
@@ -162,17 +136,8 @@ def _straight_line(plan: CompiledTree, quantity: str) -> str:
     import casadi  # noqa: PLC0415  installed or not
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]
-    x, sines, cosines, v, a = map(casadi.vertsplit, names)
-    if quantity == "jacobian":
-        J = [[0.0] * plan.nv for _ in range(6)]
-        for k, column in zip(plan.steps[:, Step.V], columns(plan, x, sines, cosines), strict=True):
-            for row, number in zip(J, (*column[0], *column[1]), strict=True):
-                row[k] = number
-        results = [number for row in J for number in row]
-    else:
-        linear, angular = acceleration(plan, x, sines, cosines, v, a)
-        results = [*linear, *angular]
-    function = casadi.Function("numbers", names, [casadi.vertcat(*results)], {"cse": True})
+    numbers = results(plan, quantity, *map(casadi.vertsplit, names))
+    function = casadi.Function("numbers", names, [casadi.vertcat(*numbers)], {"cse": True})
     generator = casadi.CodeGenerator("generated")
     generator.add(function)
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)

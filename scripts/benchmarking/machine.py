@@ -78,10 +78,8 @@ def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str
 def _run_apart(*words: str, cache: str | None = None) -> dict[str, Any]:
     """Run this module in a new process and return its answer."""
     command = [sys.executable, "-m", "scripts.benchmarking.machine", *words]
-    given = {} if cache is None else {"NUMBA_CACHE_DIR": cache}
-    done = subprocess.run(
-        command, cwd=ROOT, capture_output=True, text=True, check=True, env={**os.environ, **given}
-    )
+    environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": cache})
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, check=True, env=environment)
     result: dict[str, Any] = json.loads(done.stdout)
     return result
 
@@ -99,11 +97,12 @@ def _first(robot: str, frame: str, *uses: str) -> dict[str, object]:
 
 def _use(model: Robot, frame: str, use: str) -> None:
     inputs = [np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)][: USES[use]]
+    of_prepared, _, name = use.rpartition(".")
     with only("compiled"):
-        if use.startswith("prepared."):
-            getattr(model.prepare(frame), use.removeprefix("prepared."))(*inputs)
+        if of_prepared:
+            getattr(model.prepare(frame), name)(*inputs)
         else:
-            getattr(model, use)(*inputs, frame, verify=False)
+            getattr(model, name)(*inputs, frame, verify=False)
 
 
 def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dict[str, object]:
@@ -120,14 +119,8 @@ def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dic
         before = _bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
         taken = _bytes("VmHWM") - before + (out.nbytes if out is not None else 0)
-    return {
-        "robot": robot,
-        "quantity": quantity,
-        "n": n,
-        "out": kind == "out",
-        "output_bytes": result.nbytes,
-        "peak_bytes": taken,
-    }
+    sizes = {"output_bytes": result.nbytes, "peak_bytes": taken}
+    return {"robot": robot, "quantity": quantity, "n": n, "out": kind == "out", **sizes}
 
 
 def _bytes(entry: str) -> int:

@@ -26,18 +26,13 @@ _SINE_COSINE = 51
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A number that stores its operands.
+    """A number that stores its operands."""
 
-    Attributes:
-        known: 0 or 1 if the number is this constant; None otherwise.
-        nothing: Whether the number is not needed. Operations with such a number are not counted, because
-            their results are not needed either.
-        made_of: The operands; empty for an input.
-    """
-
-    known: int | None = None
+    known: int | None = None  # 0 or 1 if the number is this constant; None otherwise
+    #: Whether the number is not needed. Operations with such a number are not counted, because their results
+    #: are not needed either.
     nothing: bool = False
-    made_of: tuple[Number, ...] = ()
+    made_of: tuple[Number, ...] = ()  # the operands; empty for an input
 
     def __add__(self, other: Number) -> Number:
         if self.nothing or other.nothing:

@@ -35,7 +35,8 @@ class Subject:
         name: Name of the robot in the tables.
         frame: Name of the frame.
         n: Number of configurations of a batch.
-        robot: The robot in urdfkin.
+        loop: Number of configurations in a loop.
+        robot: The robot in urdfkin; nv is the number of columns of its Jacobians.
         q: (n, nq) configurations.
         v: (n, nv) joint velocities.
         a: (n, nv) joint accelerations.
@@ -43,8 +44,9 @@ class Subject:
     """
 
     def __init__(self, source: str, frame: str, n: int, *, name: str | None = None) -> None:
-        self.name, self.frame, self.n = name or source, frame, n
+        self.name, self.frame, self.n, self.loop = name or source, frame, n, min(n, LOOP)
         self.robot: Robot = urdfkin.load(source, verify=False, mimic=False)
+        self.nv = self.robot.nv
         self.q = self.robot.sample(n, seed=0)
         if not np.array_equal(self.q[:1], self.robot.to_pinocchio(self.q[:1])):
             raise ValueError(f"{self.name}: Pinocchio has other coordinates")
@@ -56,16 +58,6 @@ class Subject:
 
     def __exit__(self, *exception: object) -> None:
         self.stack.close()
-
-    @property
-    def nv(self) -> int:
-        """Number of columns of a Jacobian."""
-        return self.robot.nv
-
-    @property
-    def loop(self) -> int:
-        """Number of configurations in a loop."""
-        return min(self.n, LOOP)
 
     @property
     def plan(self) -> CompiledTree:
@@ -147,23 +139,19 @@ def chain_urdf(joints: int, seed: int = 0) -> str:
     axes = generator.standard_normal((joints, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     turns = generator.uniform(-3.0, 3.0, (joints, 3))
-    links = [f'<link name="link{i:03}"/>' for i in range(joints + 1)]
-    moving = [
-        f'<joint name="joint{i:03}" type="revolute">{_origin(0.1, turns[i])}'
-        f'<parent link="link{i:03}"/><child link="link{i + 1:03}"/><axis xyz="{_text(axes[i])}"/>'
+
+    def text(numbers: FloatArray) -> str:
+        return " ".join(repr(float(x)) for x in numbers)
+
+    parts = [f'<link name="link{i:03}"/>' for i in range(joints + 1)]
+    parts += [
+        f'<joint name="joint{i:03}" type="revolute"><origin xyz="0.1 0 0" rpy="{text(turns[i])}"/>'
+        f'<parent link="link{i:03}"/><child link="link{i + 1:03}"/><axis xyz="{text(axes[i])}"/>'
         '<limit lower="-3" upper="3" velocity="1" effort="1"/></joint>'
         for i in range(joints)
     ]
     tip = (
-        f'<link name="{TIP}"/><joint name="end" type="fixed">{_origin(0.1, np.zeros(3))}'
+        f'<link name="{TIP}"/><joint name="end" type="fixed"><origin xyz="0.1 0 0" rpy="0.0 0.0 0.0"/>'
         f'<parent link="link{joints:03}"/><child link="{TIP}"/></joint>'
     )
-    return f'<robot name="chain{joints}">{"".join(links)}{"".join(moving)}{tip}</robot>'
-
-
-def _origin(length: float, rpy: FloatArray) -> str:
-    return f'<origin xyz="{length} 0 0" rpy="{_text(rpy)}"/>'
-
-
-def _text(numbers: FloatArray) -> str:
-    return " ".join(repr(float(x)) for x in numbers)
+    return f'<robot name="chain{joints}">{"".join(parts)}{tip}</robot>'

@@ -12,12 +12,13 @@ import gc
 import random
 import statistics
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
+from scripts.benchmarking.subject import Subject
 from urdfkin.model.tree import FloatArray
 
 #: Allowed difference of results in m, rad, m/s^2, rad/s^2.
@@ -27,64 +28,40 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Work:
-    """The computation of one quantity by one contender.
+    """The computation of one quantity by one contender."""
 
-    Attributes:
-        who: Name of the contender in the tables.
-        n: Number of configurations: `compute` uses the first `n` configurations of the subject.
-        compute: The timed function.
-        result: Returns the results in urdfkin's conventions, for the first configurations. It is not timed.
-            None: there are no results to compare; for example, a task only writes the output.
-        tolerance: Allowed difference from Pinocchio.
-        remark: A remark on the measurement.
-    """
-
-    who: str
-    n: int
-    compute: Callable[[], object]
+    who: str  # name of the contender in the tables
+    n: int  # number of configurations: `compute` uses the first `n` configurations of the subject
+    compute: Callable[[], object]  # the timed function
+    #: Returns the results in urdfkin's conventions, for the first configurations. It is not timed. None:
+    #: there are no results to compare; for example, a task only writes the output.
     result: Callable[[], FloatArray] | None = None
-    tolerance: float = TOLERANCE
-    remark: str = ""
+    tolerance: float = TOLERANCE  # allowed difference from Pinocchio
+    remark: str = ""  # a remark on the measurement
 
 
 @dataclass(frozen=True)
 class Table:
-    """The common properties of the rows of a table.
+    """The common properties of the rows of a table."""
 
-    Attributes:
-        section: A name of `sections.SECTIONS`.
-        robot: A name of the catalogue, or the number of joints of a chain.
-        quantity: jacobian, acceleration or placement.
-        numbers: Number of float64 values of one configuration's result.
-        size: Number of joints, frames or configurations, whichever the table varies.
-    """
-
-    section: str
-    robot: str
-    quantity: str
-    numbers: int
-    size: int = 0
+    section: str  # a name of `sections.SECTIONS`
+    robot: str  # a name of the catalogue, or the number of joints of a chain
+    quantity: str  # jacobian, acceleration or placement
+    numbers: int  # number of float64 values of one configuration's result
+    size: int = 0  # number of joints, frames or configurations, whichever the table varies
 
 
 @dataclass(frozen=True)
 class Row(Table):
-    """One contender's measurements.
+    """One contender's measurements."""
 
-    Attributes:
-        who: Name of the contender.
-        n: Number of configurations of a call.
-        median_ns: Median time for one configuration over the rounds.
-        minimum_ns: Minimum time for one configuration.
-        ratio: Median of the baseline divided by this median; above 1 is faster than the baseline.
-        remark: A remark on the measurement.
-    """
-
-    who: str = ""
-    n: int = 0
-    median_ns: float = 0.0
-    minimum_ns: float = 0.0
+    who: str = ""  # name of the contender
+    n: int = 0  # number of configurations of a call
+    median_ns: float = 0.0  # median time for one configuration over the rounds
+    minimum_ns: float = 0.0  # minimum time for one configuration
+    #: Median of the baseline divided by this median; above 1 is faster than the baseline.
     ratio: float | None = None
-    remark: str = ""
+    remark: str = ""  # a remark on the measurement
 
 
 class DifferenceError(Exception):
@@ -166,3 +143,87 @@ def measure(
         return Row(**asdict(table), **own, median_ns=round(medians[work.who], 3), minimum_ns=fastest)
 
     return [row(work) for work in works]
+
+
+# -- calls in a loop -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Calls:
+    """The lines of Python that call a library to compute one quantity of one configuration.
+
+    The lines become the body of a loop over configurations, and their names become local variables.
+    Therefore, the measured time of a library includes no function call of the benchmark.
+    """
+
+    who: str  # name of the contender
+    names: Mapping[str, Any]  # variables that the lines use, besides `q`, `v` and `a`
+    lines: tuple[str, ...]  # the calls; the last line is an expression whose value is the result
+    #: The lines for a batch, which write their result to `out[k]`. None: the batch runs `lines`, and stores
+    #: the value of the last line in `out[k]`.
+    store: tuple[str, ...] | None = None
+    #: For each coordinate of the library, its index among urdfkin's coordinates. None: the library and
+    #: urdfkin have the same order.
+    order: list[int] | None = None
+    #: Shape of one configuration's result in a batch; None: urdfkin's shape.
+    shape: tuple[int, ...] | None = None
+    #: Converts a batch's raw results to urdfkin's conventions.
+    read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
+    #: Converts the value of the last line to an array with the layout of one row of a batch.
+    read_one: Callable[[Any], FloatArray] = field(default=np.array)
+    remark: str = ""  # see `Work`
+
+    def batch(self, subject: Subject, quantity: str) -> Work:
+        """Return the timed task for a batch: a loop over all configurations that fills a reused array."""
+        inputs = [self._ordered(x) for x in subject.inputs(quantity, subject.loop)]
+        out = np.empty((subject.loop, *(self.shape or subject.width(quantity))))
+        loop = self.loop()
+        run, result = lambda: loop(out, *inputs), lambda: self.read(out)
+        return Work(self.who, subject.loop, run, result, remark=self.remark)
+
+    def loop(self) -> Callable[..., None]:
+        """Return a function with the loop.
+
+        The arguments of the function are `out` and the batch of q, or the batches of q, v and a.
+        """
+        body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
+        return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
+
+    def single(self, subject: Subject, quantity: str) -> Work:
+        """Return the timed task for single calls.
+
+        The results of these calls are not stored, and the rows of the inputs are prepared beforehand.
+        """
+        inputs = [list(self._ordered(x)) for x in subject.inputs(quantity, subject.loop)]
+        rows = list(_rows(inputs))
+        repeat = _function(self.names, "rows_", "for q, v, a in rows_:", self.lines)
+        last = (*self.lines[:-1], f"return {self.lines[-1]}")
+        one = _function(self.names, "q, v, a", "if True:", last)
+
+        def result() -> FloatArray:
+            return self.read(np.stack([self.read_one(one(*row)) for row in rows[:20]]))
+
+        return Work(self.who, len(rows), lambda: repeat(rows), result, TOLERANCE, self.remark)
+
+    def _ordered(self, x: FloatArray) -> FloatArray:
+        return x if self.order is None else np.ascontiguousarray(x[:, self.order])
+
+
+def _rows(inputs: Any) -> Any:
+    """Yield (q, v, a) for each configuration. If q is the only input, yield (q, q, q) instead."""
+    return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
+
+
+def _function(
+    names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
+) -> Callable[..., Any]:
+    """Make a function whose code is the line `head` and, below it, the indented lines `body`.
+
+    The code can use `names` as local variables.
+    """
+    here = {"rows": _rows, **names}
+    parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
+    source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])
+    exec(compile(source, "<calls>", "exec"), here)
+    function: Callable[..., Any] = here["function"]
+    return function

@@ -1,1 +1,1 @@
-"""Run tables that are exported as code."""
+"""Programs that run tables exported as code."""

@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass
 
-#: Outcome of a test in which the table was read, and was compared with the UR5.
-COMPARED = "read and compared"
 #: Outcomes with which the test of a robot passes.
 GOOD = (
     "refused",
     "verified",
     "not verified, with a finding that states the reason",
     "too large to compute, with a finding that states the reason",
-    COMPARED,
 )
 
 
@@ -22,10 +19,17 @@ class Case:
     data: bytes
     root_joint: str | None = None
     mimic: bool | None = None
-    suffix: str = ".urdf"
 
     @property
     def words(self) -> str:
         """Return the line of text that is stored as a note with a failing file."""
         options = f"root_joint={self.root_joint!r}, mimic={self.mimic!r}"
         return f"{self.what}; load(..., {options})"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The outcome of a test and its details. The outcome is one of `GOOD`, or the name of a failure."""
+
+    word: str
+    details: str = ""

@@ -1,17 +1,29 @@
-"""Test one robot: check it, load it, compute all quantities and compare them with Pinocchio."""
+"""Test one robot: check it, load it, compute all quantities and compare them with Pinocchio.
+
+Every quantity is computed in each reference frame, single and in batches, on any base. urdfkin compares each
+call with Pinocchio. The results of different calls must have the same bits, because all calls use the same
+forward recursion. Every name of a frame must be accepted.
+"""
 
 from __future__ import annotations
 
 import traceback
 import warnings
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 import urdfkin
-from scripts.fuzzing import Case, mjcf
-from scripts.fuzzing.asking import MismatchError, ask, ask_prepared
-from urdfkin.errors import InputError, RangeError, UrdfkinError
+from scripts.fuzzing import Case, Outcome, mjcf
+from urdfkin import BaseMotion, Reference
+from urdfkin.errors import (
+    InputError,
+    RangeError,
+    RepresentationSingularityError,
+    UnknownNameError,
+    UrdfkinError,
+)
+from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
@@ -20,14 +32,18 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 #: Findings about sizes beyond the floating-point range.
 #: Results of robots with such findings may be infinite or nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
+#: Largest numbers of frames for which quantities are computed in one pass, and one by one.
+TOGETHER, ALONE = 12, 2
+#: Number of frame names that are looked up for each robot.
+NAMES = 6
+#: Distance of the far base from the world's origin, in metres.
+FAR = 1e6
+#: The quantities of several frames, each with its number of inputs.
+QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """The outcome of a test and its details. The outcome is one of `GOOD`, or the name of a failure."""
-
-    word: str
-    details: str = ""
+class MismatchError(Exception):
+    """Error if two computations of the same number return different results."""
 
 
 def judge(case: Case) -> Outcome:
@@ -53,7 +69,7 @@ def _judge(case: Case) -> Outcome:
             return Outcome("load refuses a file that check accepts", str(error))
         if errors:
             return Outcome("load accepts a file that check refuses", str(errors[0]))
-        return _computed(robot, findings, warned) or _unverified(robot, findings, warned)
+        return _computed(robot, findings, warned)
 
 
 def _judge_mjcf(case: Case) -> Outcome:
@@ -67,17 +83,14 @@ def _judge_mjcf(case: Case) -> Outcome:
             return Outcome("refused" if known else "load refuses a file that MuJoCo accepts", str(error))
         if model is not None and (found := mjcf.difference(robot, model, 0)) is not None:
             return Outcome("MuJoCo reads another robot", found)
-        return _computed(robot, robot.findings, warned) or _unverified(robot, robot.findings, warned)
+        return _computed(robot, robot.findings, warned)
 
 
-def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome | None:
-    """Compute all quantities and return the outcome; None if some results are not verified."""
-    big = bool(_SIZES & {finding.code for finding in findings})
-    too_large = (
-        "too large to compute, with a finding that states the reason"
-        if big
-        else "a result is not a finite number"
-    )
+def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
+    """Compute all quantities and return the outcome."""
+    too_large = "a result is not a finite number"
+    if _SIZES & {finding.code for finding in findings}:
+        too_large = "too large to compute, with a finding that states the reason"
     try:
         for what, result in ask(robot, seed=0):
             if not np.isfinite(result).all():
@@ -94,19 +107,157 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
         return Outcome(too_large, str(error))
     except MismatchError as error:
         return Outcome("two computations of one result differ", str(error))
-    return Outcome("verified") if verified else None
+    return Outcome("verified") if verified else _unverified(robot, findings, warned)
 
 
 def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
-    """Return the outcome if some results are not verified.
-
-    The outcome is good if urdfkin reported the reason. Otherwise, it is a failure.
-    """
+    """Return the outcome if some results are not verified: good only if urdfkin reported the reason."""
     marked = [finding for finding in findings if finding.oracle is not None]
     if marked:
         return Outcome("not verified, with a finding that states the reason", marked[0].code)
     if (reason := robot.verifier.cannot()) is not None:
         return Outcome("Pinocchio refuses a file that check accepts", reason)
-    return Outcome(
-        "not verified, without a finding that states the reason", "; ".join(str(w.message) for w in warned)
-    )
+    texts = "; ".join(str(w.message) for w in warned)
+    return Outcome("not verified, without a finding that states the reason", texts)
+
+
+# -- all quantities ----------------------------------------------------------------------------------------
+
+
+def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the name and the result of each checked computation.
+
+    Raises:
+        MismatchError: two computations differ.
+        UrdfkinError: a call raises an error. Errors about singular representations and about paths without a
+            table are expected and not raised.
+    """
+    generator = np.random.default_rng(seed)
+    inputs = _inputs(robot, seed)
+    frames = robot.all_frames
+    if len(frames) > TOGETHER:
+        frames = tuple(frames[i] for i in sorted(generator.choice(len(frames), TOGETHER, replace=False)))
+    alone = [frames[i] for i in sorted({len(frames) - 1, int(generator.integers(len(frames)))})][:ALONE]
+    yield from _names(robot, inputs[0][0], generator)
+    for base in (None, _base(generator, 1.0), _base(generator, FAR)):
+        for reference in Reference:
+            yield from _together(robot, frames, alone, reference, base, inputs)
+        for frame in alone:
+            for representation in ("ZYZ", "xyz", "quaternion"):
+                try:
+                    J = robot.analytical_jacobian(inputs[0], frame, representation, base=base)
+                except RepresentationSingularityError:
+                    continue
+                yield f"analytical_jacobian {representation}", J
+    yield from _tables(robot, alone)
+
+
+def ask_prepared(robot: Robot, seed: int) -> None:
+    """Compare the unchecked results of a prepared frame with the results of checked calls.
+
+    Raises:
+        MismatchError: a result of the prepared frame differs.
+    """
+    inputs = [x[0] for x in _inputs(robot, seed)]
+    frame = robot.all_frames[-1]
+    for reference in Reference:
+        fast = robot.prepare(frame, reference)
+        for name in ("placement", "velocity", "jacobian", "acceleration"):
+            ours = getattr(fast, name)(*inputs[: QUANTITIES[name]])
+            theirs = _result(robot, name, inputs, frame, reference)
+            _same(f"{name} of {frame!r} prepared and not", ours, theirs)
+
+
+def _inputs(robot: Robot, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    v, a = np.random.default_rng([seed, 1]).normal(size=(2, 2, robot.nv))
+    return robot.sample(2, seed), v, a
+
+
+def _base(generator: np.random.Generator, size: float) -> BaseMotion:
+    """Return a rotated, moving base at a distance of `size` metres."""
+    R = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+    T = np.eye(4)
+    T[:3, :3] = R * np.linalg.det(R)
+    T[:3, 3] = size * generator.normal(size=3)
+    return BaseMotion(T, *generator.normal(size=(2, 6)))
+
+
+def _result(
+    robot: Robot,
+    name: str,
+    inputs: Sequence[FloatArray],
+    frame: str | tuple[str, ...],
+    reference: Reference,
+    base: BaseMotion | None = None,
+) -> FloatArray:
+    words = (frame,) if name == "placement" else (frame, reference)
+    result: FloatArray = getattr(robot, name)(*inputs[: QUANTITIES[name]], *words, base=base)
+    return result
+
+
+def _together(
+    robot: Robot,
+    frames: tuple[str, ...],
+    alone: list[str],
+    reference: Reference,
+    base: BaseMotion | None,
+    inputs: tuple[FloatArray, ...],
+) -> Iterator[tuple[str, FloatArray]]:
+    """Yield each quantity, computed in three ways.
+
+    The three ways are all frames in a batch of configurations, one frame in the same batch, and a single
+    configuration of the batch.
+    """
+    q, v, a = inputs
+    single = [x[1] for x in inputs]
+    for name in QUANTITIES:
+        if name == "placement" and reference is not Reference.LOCAL_WORLD_ALIGNED:
+            continue
+        every = _result(robot, name, inputs, frames, reference, base)
+        yield name, every
+        for frame in alone:
+            batch = _result(robot, name, inputs, frame, reference, base)
+            one = _result(robot, name, single, frame, reference, base)
+            _same(f"{name} of several frames and of {frame!r}", every[:, frames.index(frame)], batch)
+            _same(f"{name} of {frame!r} in a batch and alone", batch[1], one)
+    for frame in alone:
+        words = (frame, reference)
+        rate = robot.jacobian_rate(q, v, *words, base=base)
+        _same(f"jacobian_rate of {frame!r}", rate[0], robot.jacobian_rate(q[0], v[0], *words, base=base))
+        yield "jacobian_rate", rate
+        yield "acceleration_breakdown", robot.acceleration_breakdown(q, v, a, *words, base=base).total
+
+
+def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
+    """Yield placements of frames that are given by name.
+
+    urdfkin and Pinocchio look up each name independently.
+    """
+    links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
+    own = sorted(links | joints)
+    asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]
+    for i in generator.permutation(len(asked))[:NAMES]:
+        try:
+            yield f"placement of {asked[i]!r}", robot.placement(q, asked[i])
+        except UnknownNameError:  # for example `joint:x`, if x is only a link
+            if asked[i] in own:
+                raise
+        except InputError:  # two frames have this name
+            if asked[i] not in links & joints:
+                raise
+
+
+def _tables(robot: Robot, frames: list[str]) -> Iterator[tuple[str, FloatArray]]:
+    """Yield Denavit-Hartenberg tables of paths from the root without planar and floating joints."""
+    tree = robot.tree
+    for frame in frames:
+        if any(tree.joints[i].nq > 1 for i in tree.path(tree.frame_link(frame))):
+            continue
+        for convention in ("standard", "modified"):
+            table = robot.dh(frame, tree.link_frames[0], convention)
+            yield f"{convention} table", table.placement(robot.select(table, robot.neutral()))
+
+
+def _same(what: str, x: FloatArray, y: FloatArray) -> None:
+    if x.tobytes() != y.tobytes() and not np.array_equal(x, y, equal_nan=True):
+        raise MismatchError(f"{what}: off by {np.abs(x - y).max():.3g}")

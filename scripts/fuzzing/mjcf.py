@@ -22,9 +22,8 @@ _CLASSES = ("outer", "inner", "other")
 #: The two sides of an equality may differ by the same amount.
 _APART = 1e-12
 
-mujoco.set_mju_user_warning(
-    lambda said: None
-)  # otherwise MuJoCo writes a log of dynamics warnings into the current folder
+# Otherwise MuJoCo writes a log of dynamics warnings into the current folder.
+mujoco.set_mju_user_warning(lambda said: None)
 
 
 def robot(seed: int, family: str, number: int) -> Case:
@@ -71,10 +70,8 @@ class _File:
             return f"<joint {joint}/>{site}"
 
         inner = f'<default class="inner">{inside()}</default>'
-        outer = (
-            f'<default class="outer">{inside()}{inner}</default><default class="other">{inside()}</default>'
-        )
-        return f"<default>{outer}</default>"
+        outer = f'<default class="outer">{inside()}{inner}</default>'
+        return f'<default>{outer}<default class="other">{inside()}</default></default>'
 
     def body(self, depth: int) -> str:
         """Return a body with its joints, shapes, sites and child bodies."""
@@ -84,9 +81,8 @@ class _File:
         if self.family == "mjcf-classes" and rng.random() < 0.4:
             words.append(f'childclass="{rng.choice(_CLASSES)}"')
         free = depth == 0 and rng.random() < (0.8 if self.family == "mjcf-free" else 0.1)
-        parts = [
-            self.free_joint() if free else "".join(self.joint() for _ in range(rng.choice((0, 1, 1, 2))))
-        ]
+        joints = [self.free_joint()] if free else [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
+        parts = ["".join(joints)]
         parts += [self.shape() for _ in range(rng.randint(1, 2))]
         if rng.random() < 0.2:
             moments = " ".join(repr(1.0 + rng.random()) for _ in range(3))
@@ -143,15 +139,14 @@ class _File:
         """Return an orientation in a random notation of MJCF, or no orientation."""
         rng = self.rng
         angle = 90.0 if self.degrees else 1.5
-        return rng.choice(
-            (
-                "",
-                f'quat="{" ".join(repr(rng.gauss(0.0, 1.0)) for _ in range(4))}"',
-                f'euler="{" ".join(repr(rng.uniform(-angle, angle)) for _ in range(3))}"',
-                f'axisangle="{" ".join(map(repr, odd.direction(rng)))} {rng.uniform(-angle, angle)!r}"',
-                f'xyaxes="1 {rng.random()!r} 0 0 1 {rng.random()!r}"',
-            )
+        notations = (
+            "",
+            f'quat="{" ".join(repr(rng.gauss(0.0, 1.0)) for _ in range(4))}"',
+            f'euler="{" ".join(repr(rng.uniform(-angle, angle)) for _ in range(3))}"',
+            f'axisangle="{" ".join(map(repr, odd.direction(rng)))} {rng.uniform(-angle, angle)!r}"',
+            f'xyaxes="1 {rng.random()!r} 0 0 1 {rng.random()!r}"',
         )
+        return rng.choice(notations)
 
     def vector(self) -> str:
         """Return three random lengths as text."""

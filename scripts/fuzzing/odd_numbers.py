@@ -31,9 +31,8 @@ def tame_length(rng: random.Random) -> float:
 
 def odd_length(rng: random.Random) -> float:
     """Return a length from 1e-320 to 1e300; the sum of several such lengths usually does not overflow."""
-    exponent = rng.choice(
-        (rng.uniform(-320, 300), rng.uniform(-20, 20), rng.uniform(-6, 8), rng.uniform(-320, -150), -310.0)
-    )
+    ranges = ((-320, 300), (-20, 20), (-6, 8), (-320, -150), (-310, -310))
+    exponent = rng.choice([rng.uniform(*ends) for ends in ranges])
     return rng.choice((-1.0, 1.0)) * rng.uniform(1.0, 9.9) * math.pow(10.0, exponent)
 
 
@@ -93,20 +92,8 @@ def odd_size(rng: random.Random) -> float:
 
 def odd_factor(rng: random.Random) -> float:
     """Return the multiplier of a mimic joint."""
-    return rng.choice(
-        (
-            0.0,
-            -0.0,
-            1.0,
-            -1.0,
-            3.7,
-            -0.1,
-            1e-300,
-            5e-324,
-            rng.gauss(0.0, 1.0),
-            -(10.0 ** rng.uniform(-12, 12)),
-        )
-    )
+    plain = (0.0, -0.0, 1.0, -1.0, 3.7, -0.1, 1e-300, 5e-324)
+    return rng.choice((*plain, rng.gauss(0.0, 1.0), -(10.0 ** rng.uniform(-12, 12))))
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
@@ -116,18 +103,9 @@ def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
     if rng.random() < 0.02:
         return max(a, b), min(a, b)
     far = rng.uniform(-1e6, 1e6)
-    return rng.choice(
-        (
-            (min(a, b), max(a, b)),
-            (a, a),
-            (a, math.nextafter(a, math.inf)),
-            (far, far + 1.0),
-            (-1e300, 1e300),
-            (0.0, 0.0),
-            (-0.0, 5e-324),
-            (-math.pi, math.pi),
-        )
-    )
+    drawn = ((min(a, b), max(a, b)), (a, a), (a, math.nextafter(a, math.inf)), (far, far + 1.0))
+    plain = ((-1e300, 1e300), (0.0, 0.0), (-0.0, 5e-324), (-math.pi, math.pi))
+    return rng.choice((*drawn, *plain))
 
 
 def odd_limit(rng: random.Random) -> str:

@@ -27,19 +27,12 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Slip:
-    """One mutant: a new value in a list or in a field of a node.
+    """One mutant: a new value in a list or in a field of a node."""
 
-    Attributes:
-        shown: The node that is shown to the user.
-        home: The list or the node.
-        place: The index or the field.
-        value: The new value.
-    """
-
-    shown: ast.AST
-    home: Any
-    place: int | str
-    value: Any
+    shown: ast.AST  # the node that is shown to the user
+    home: Any  # the list or the node
+    place: int | str  # the index or the field
+    value: Any  # the new value
 
     @property
     def line(self) -> int:

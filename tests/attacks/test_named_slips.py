@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from scripts.mutate import judge_named
+from scripts.mutate import ROOT, Named, judge_named, named_slips
 from scripts.mutating.operators import rewritten
-from scripts.mutating.selection import ROOT, Named, named_slips
 
 SLIPS = named_slips()
 

@@ -6,7 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+import urdfkin
 from tests.calibration.arms import BRANCHED, Bench, bench, pose
 from tests.calibration.test_way import table
 from urdfkin.calibration.calibrate import Calibration, ImplausibleError, calibrate
@@ -226,3 +229,40 @@ def test_only_parameters_beyond_two_standard_deviations_are_written() -> None:
     )
     moved = set(few.origins)
     assert moved == {few.parameters[k].where for k in few.written_parameters}
+
+
+CATALOGUE_ARMS = (
+    *("ur3", "ur5", "ur10", "panda", "z1", "xarm7"),
+    *("kinova", "so100", "talos_left_arm", "elbow", "polar"),
+)
+
+
+@pytest.mark.long
+@settings(max_examples=16)
+@given(
+    name=st.sampled_from(CATALOGUE_ARMS),
+    mistake=st.sampled_from(("none", "none", "degrees", "rows one later", "rows one earlier")),
+    complete=st.booleans(),
+    fit=st.sampled_from((["origins"], ALL)),
+    poses=st.integers(25, 60),
+    error=st.floats(-5.0, -2.5),
+    noise=st.floats(-6.0, -3.0),
+    seed=st.integers(0, 10**6),
+)
+def test_random_good_data_are_verified_and_random_wrong_data_refused(
+    name: str, mistake: str, complete: bool, fit: list[str], poses: int, error: float, noise: float, seed: int
+) -> None:
+    robot = urdfkin.load(name)
+    tip, base = robot.tip_frame, robot.base_frame
+    true = bench(name, ("origins",), tip, base, poses=poses, error=10.0**error, seed=seed)
+    T = true.noisy(10.0**noise, 10.0**noise, seed)
+    q = np.degrees(true.q) if mistake == "degrees" else true.q
+    q = np.roll(q, {"rows one later": 1, "rows one earlier": -1}.get(mistake, 0), axis=0)
+    measured = (robot, q, T if complete else T[:, :3, 3])
+    if mistake == "none":
+        found = calibrate(*measured, tip=tip, base=base, fit=fit)
+        assert found.certificate is not None
+        assert found.certificate.verified
+    else:
+        with pytest.raises(ImplausibleError):
+            calibrate(*measured, tip=tip, base=base, fit=fit)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scripts.forms.running import RUN, Job, Missing
+from scripts.check_forms import RUN, Job, Missing
 from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift

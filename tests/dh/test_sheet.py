@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,7 @@ from urdfkin.dh import (
     to_convention,
     units_of,
 )
+from urdfkin.dh.compare import compare
 from urdfkin.dh.parse_table import (
     is_table_file,
     mapping_from_text,
@@ -32,7 +35,7 @@ from urdfkin.dh.parse_table import (
 )
 from urdfkin.dh.rows import last_digits
 from urdfkin.dh.units import NoCellError, cell_of
-from urdfkin.errors import InputError, SourceError
+from urdfkin.errors import InputError, SourceError, UrdfkinError
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot.loading import load
 
@@ -330,3 +333,60 @@ def test_a_table_in_a_form_has_radians_metres_and_ten_digits_unless_asked(form: 
     assert write() == write("radians", "metres", 10)
     assert "1.4142135624" not in write()
     assert "1.4142135624" in write(digits=11)
+
+
+#: Texts that replace characters of a table, to damage it.
+PIECES = (
+    *",;\t|& \"'\n\\{}[]()_^$-+*/0123456789eqadtheta.\x00\ufeffα",
+    *("", "nan", "inf", "1e400", "1e155", "(i-1)"),
+)
+#: For each format of `export`: the suffix of its files.
+SUFFIXES = {
+    "csv": ".csv",
+    "markdown": ".md",
+    "latex": ".tex",
+    "terminal": ".txt",
+    "toml": ".toml",
+    "json": ".json",
+}
+
+
+@cache
+def printed_ur5() -> dict[str, str]:
+    table = read_table(reference_path("ur5"))
+    rows = "0\tpi/2\t0,1\t0\n" * len(table.rows)
+    sheets = {suffix: export(table, form) for form, suffix in SUFFIXES.items()}
+    return {**sheets, ".tsv": f"convention: standard\na\talpha\td\ttheta\n{rows}"}
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> tuple[str, str]:
+    """The suffix and the text of a table with a few characters changed, removed or repeated."""
+    suffix = draw(st.sampled_from([*SUFFIXES.values(), ".tsv"]))
+    text = printed_ur5()[suffix]
+    for _ in range(draw(st.integers(1, 5))):
+        head = max(text.find("theta"), 40) + 20  # damage near the headings is the most instructive
+        k = draw(st.integers(0, min(head, len(text))) | st.integers(0, len(text)))
+        piece = draw(st.sampled_from((*PIECES, text[k : k + 4], 3 * text[k : k + 4])))
+        text = text[:k] + piece + text[k + draw(st.integers(0, 12)) :]
+    return suffix, text
+
+
+@pytest.mark.slow
+def test_a_damaged_table_is_refused_with_a_message_or_read_and_compared() -> None:
+    path, outcomes = load("ur5").chain("tool0", "base"), Counter[str]()
+
+    @settings(max_examples=100)
+    @given(damaged())
+    def judge(sheet: tuple[str, str]) -> None:
+        suffix, text = sheet
+        try:
+            compare(path, table_from_text(text, suffix))
+        except UrdfkinError as error:
+            outcomes["refused"] += bool(str(error))
+        else:
+            outcomes["read"] += 1
+
+    judge()
+    assert outcomes["refused"] > 10
+    assert outcomes["read"] > 10

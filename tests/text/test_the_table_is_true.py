@@ -128,7 +128,7 @@ def test_every_misprint_has_a_proof_that_passes() -> None:
 
 def test_the_page_is_current() -> None:
     page = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
-    assert page == table(), "run scripts/make_equations.py"
+    assert page == table(), "run python scripts/make_pages.py equations"
 
 
 def test_explain_gives_a_page_for_each_equation_and_says_which_are_lost() -> None:

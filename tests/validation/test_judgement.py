@@ -8,7 +8,7 @@ import pytest
 from flint import arb
 
 import urdfkin
-from scripts import make_enclosures, make_judge
+from scripts import make_pages
 from tests.high_precision import mp as independent
 from tests.high_precision import rate, second_rate
 from tests.laws.subjects import robot_of
@@ -131,7 +131,7 @@ def test_the_digits_of_the_true_values_grow_with_the_joints_before_a_link(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(accuracy, "DIGITS", 15)  # too few for 20 joints, as 50 are for 200
-    for line in judge(urdfkin.load(make_enclosures.askew(20), verify=False), samples=1).lines:
+    for line in judge(urdfkin.load(make_pages.askew(20), verify=False), samples=1).lines:
         assert line.urdfkin.worst < 40.0, line
         assert line.pinocchio.worst < 40.0, line
 
@@ -322,8 +322,11 @@ def test_errors_that_are_the_same_double_are_equal_as_the_page_says() -> None:
     counts = "urdfkin is more accurate in 1 of 4 lines, equal in 2, less accurate in 1"
     assert nearer_counts(lines) == counts
     assert judged_on(plain(judged)) == f"1 sample; {counts}"
-    assert f"\n{counts}. " in make_judge.page({"arm": judged})
-    lines = plain(judge(urdfkin.load("polar"), samples=make_judge.SAMPLES, seed=make_judge.SEED))["lines"]
-    table = make_judge.PAGE.read_text("utf-8").partition("## polar")[2].partition("## ")[0]
+    assert f"\n{counts}. " in make_pages.study_parts({"arm": judged})["counts"]
+
+
+def test_polar_has_as_many_equal_lines_as_its_page_says() -> None:
+    lines = plain(judge(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
+    table = make_pages.path_of("judge").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
     rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
     assert [ours == theirs for ours, theirs in rows] == [nearer(line) == "equal" for line in lines]

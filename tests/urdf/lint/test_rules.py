@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import tomllib
 import warnings
 from dataclasses import fields
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 import urdfkin
+from scripts import make_pages
 from tests.urdf.lint.cases.arm import arm
 from tests.urdf.lint.examples import document
 from tests.urdf.lint.others import ask
@@ -133,19 +132,6 @@ def test_the_others_do_with_the_bad_example_what_the_page_says(
 # -- the robots everybody uses: no error, no warning without a word about it, and a page that says so --------
 
 
-SCRIPT = Path(__file__).parents[3] / "scripts" / "make_findings.py"
-
-
-@pytest.fixture(scope="module")
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_findings", SCRIPT)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", catalogue())
 def test_no_robot_of_the_catalogue_has_an_error(robot: str) -> None:
@@ -164,15 +150,16 @@ def test_no_robot_of_the_catalogue_is_unverifiable(robot: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_page_of_findings_is_current(script: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_page_of_findings_is_current(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    assert script.PAGE.read_text("utf-8") == script.page(), "run python scripts/make_findings.py"
+    page = make_pages.path_of("findings").read_text("utf-8")
+    assert page == make_pages.page("findings"), "run python scripts/make_pages.py findings"
 
 
 @pytest.mark.slow
-def test_a_robot_is_told_a_handful_of_things_at_most(script: ModuleType) -> None:
-    assert max(len(script.warnings_of(robot)) for robot in catalogue()) <= 5
+def test_a_robot_is_told_a_handful_of_things_at_most() -> None:
+    assert max(len(make_pages.warnings_of(robot)) for robot in catalogue()) <= 5
 
 
 # -- what a comment silences is not warned of; what it cannot change stays as it is --------------------------

@@ -1,0 +1,352 @@
+"""Write the generated parts of pages: equations, performance, findings, reports, judge, enclosures.
+
+    python scripts/make_pages.py                  # all pages
+    python scripts/make_pages.py findings judge   # some pages
+
+Run this script after a change of an equation, of a code, of a robot or of a schema. Tests compare the pages
+with the output of this script. The accuracy study and the enclosures take minutes, so tests check only a part
+of their numbers. The figures of docs/performance.md and its picture are those of docs/performance.json, which
+`python scripts/benchmark.py --json docs/performance.json` writes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
+
+import urdfkin
+from scripts.benchmarking import tables
+from scripts.benchmarking.picture import draw
+from scripts.pages import DOCS, inserted, table
+from urdfkin.compiled.preload import only
+from urdfkin.kinematics.registry import table as equations
+from urdfkin.model.configuration import draw_base
+from urdfkin.report.words import nearer_counts
+from urdfkin.robot import Robot
+from urdfkin.system.documents import plain
+from urdfkin.urdf.catalogue import catalogue
+from urdfkin.urdf.findings import WRITTEN_OUT, shortened
+from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
+from urdfkin.urdf.lint.pages import RULES
+from urdfkin.urdf.lint.pages import page as page_of
+from urdfkin.validation.accuracy import Judgement, Line, judge
+from urdfkin.validation.document import VALIDATION
+from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
+from urdfkin.verify.pinocchio import version
+
+
+def _cell(text: str) -> str:
+    """Escape a text for a cell of a Markdown table."""
+    return text.replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
+
+
+# -- findings ----------------------------------------------------------------------------------------------
+
+FAMILIES = {
+    "1": "Text and XML",
+    "2": "Dialect, elements and attributes",
+    "3": "Numbers",
+    "4": "Names and structure",
+    "5": "Joints",
+    "6": "Suspicious",
+    "7": "Inertials, geometry and materials",
+}
+
+#: For each code: what the warning means for the robots of the catalogue that have it.
+REMARKS = {
+    "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
+    "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
+    "URDF508": "The limits are missing or zero, so samples within them do not move the joint.",
+    "URDF510": "The value has no effect, as expected.",
+    "URDF527": "A mirrored finger has the limits of the mimicked one; kinematics applies the rule.",
+    "URDF702": "No body has these moments of inertia; kinematics does not use them.",
+    "URDF706": "The address of the mesh is wrong, or is a path on another machine; kinematics needs no mesh.",
+    "URDF708": "Only a colour is missing.",
+}
+
+#: For each option of `check`: the limit that it raises, and the words about it.
+LIMITS = {
+    "--max-bytes": (DEFAULT_LIMITS.bytes, "bytes"),
+    "--max-depth": (DEFAULT_LIMITS.depth, "levels of nesting"),
+    "--max-elements": (DEFAULT_LIMITS.elements, "elements"),
+    "--max-attributes": (DEFAULT_LIMITS.attributes, "attributes of one element"),
+    "--max-name": (DEFAULT_LIMITS.name, "characters of a name"),
+    "--max-number": (DEFAULT_LIMITS.number, "characters of a number"),
+    "--max-markup": (DEFAULT_LIMITS.markup, "bytes of one tag or comment"),
+    "": (WRITTEN_OUT, "complete findings of a kind, also in JSON and SARIF"),
+}
+
+
+def findings() -> dict[str, str]:
+    """Return the limits, the codes, and the warnings of the robots in the catalogue."""
+    limits = [
+        (f"{limit:,} {words}", f"`{option}`" if option else "") for option, (limit, words) in LIMITS.items()
+    ]
+    heads = ("robot", "code", "where", "what", "meaning")
+    return {
+        "limits": table(("limit", "option"), limits).replace("|  |", "| |"),
+        "codes": "\n".join(_codes()),
+        "robots": table(heads, _warnings()),
+    }
+
+
+def _codes() -> Iterator[str]:
+    for digit, family in FAMILIES.items():
+        rules = [rule for rule in RULES.values() if rule.id[4] == digit]
+        rows = [
+            (
+                rule.id,
+                rule.slug,
+                rule.severity.value,
+                _cell(shortened(page_of(rule.id).title, 200)),
+                f"*{rule.oracle.value}*" if rule.oracle else "",
+            )
+            for rule in rules
+        ]
+        yield f"### {family}\n\n{table(('code', 'name', 'severity', 'finding', 'Pinocchio'), rows)}\n"
+
+
+def _warnings() -> Iterator[tuple[str, ...]]:
+    for name in catalogue():
+        for finding in warnings_of(name):
+            lines = f"line {finding.line}" + (f" and {len(finding.also)} more" if finding.also else "")
+            what = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
+            yield name, finding.code, lines, _cell(shortened(what, 200)), REMARKS[finding.code]
+
+
+def warnings_of(robot: str) -> list[Finding]:
+    """Return the warnings and errors of a robot of the catalogue."""
+    return [finding for finding in check(robot, fold=True) if finding.severity is not Severity.NOTE]
+
+
+# -- reports -----------------------------------------------------------------------------------------------
+
+
+def reports() -> dict[str, str]:
+    """Return the layout of the JSON report, from its schema."""
+    whole = VALIDATION.schema()
+    parts = {"The document": whole, **{f"`{name}`": part for name, part in whole["$defs"].items()}}
+    return {"layout": "\n".join(_layout(title, part) for title, part in parts.items())}
+
+
+def _layout(title: str, part: dict[str, Any]) -> str:
+    rows = [(f"`{name}`", _type(entry), _cell(_meaning(entry))) for name, entry in part["properties"].items()]
+    return f"### {title}\n\n{part['description']}\n\n{table(('entry', 'type', 'meaning'), rows)}\n"
+
+
+def _type(entry: dict[str, Any]) -> str:
+    """Return a type as text, such as `number or null`, `list of Check`, or the allowed values of an enum."""
+    if "$ref" in entry:
+        return f"`{entry['$ref'].rpartition('/')[2]}`"
+    if "anyOf" in entry:
+        return " or ".join(_type(choice) for choice in entry["anyOf"])
+    if "const" in entry:
+        return f"`{entry['const']}`"
+    if "enum" in entry:
+        return ", ".join("null" if word is None else f"`{word}`" for word in entry["enum"])
+    if entry["type"] == "array":
+        count = entry.get("minItems")
+        return f"{f'{count} ×' if count else 'list of'} {_type(entry['items'])}"
+    return str(entry["type"])
+
+
+def _meaning(entry: dict[str, Any]) -> str:
+    """Return the description of an entry or, if it has none, the description of the entry's type."""
+    name = entry.get("$ref", "").rpartition("/")[2]
+    return str(entry.get("description") or VALIDATION.schema()["$defs"][name]["description"])
+
+
+# -- the accuracy study ------------------------------------------------------------------------------------
+
+#: Name and kind of each robot of the accuracy study.
+STUDIED = {
+    "panda": "arm with seven joints, gripper with a mimic joint",
+    "ur5": "arm with six-digit angles",
+    "xarm7": "arm from CAD",
+    "kinova": "arm with three fingers",
+    "allegro_left_hand": "hand, short fingers",
+    "tiago_pro": "mobile manipulator with mimic joints",
+    "talos": "humanoid",
+    "icub": "humanoid, long chains, skew axes",
+    "anymal": "quadruped",
+    "so100": "hobby arm, skew axes",
+    "polar": "polar robot of the textbook",
+}
+#: Robots that are also studied on a moving base.
+MOVING = ("talos", "anymal", "ur5")
+#: Numbers of samples of each robot in the accuracy study and in the table of enclosures.
+SAMPLES, ENCLOSED = 10, 5
+
+
+def study() -> dict[str, str]:
+    """Run the accuracy study, and return the parts of its page."""
+    judgements = {
+        f"{name}: {kind}": judge(urdfkin.load(name), samples=SAMPLES) for name, kind in STUDIED.items()
+    }
+    for name in MOVING:
+        base = draw_base(SAMPLES, np.random.default_rng([0, 1]))
+        judgements[f"{name} on a moving base"] = judge(urdfkin.load(name), samples=SAMPLES, base=base)
+    return study_parts(judgements)
+
+
+def study_parts(judgements: dict[str, Judgement]) -> dict[str, str]:
+    """Return the parts of the page of an accuracy study: the counts, and a table for each robot."""
+    lines = [line for judgement in judgements.values() for line in plain(judgement)["lines"]]
+    ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
+    counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
+By the typical error
+{nearer_counts(lines)}. Equal errors are
+the same double. The ratio of the typical errors, urdfkin's divided by Pinocchio's, has the median
+{median(ratios):.2f}. It lies between {min(ratios):.2f} and {max(ratios):.2f}."""
+    sections = [f"## {name}\n\n{_errors(judgement.lines)}" for name, judgement in judgements.items()]
+    return {"counts": counts, "tables": "\n\n".join(sections)}
+
+
+def _errors(lines: tuple[Line, ...]) -> str:
+    sides = [f"{side} {error}" for error in ("worst", "typical") for side in ("urdfkin", "Pinocchio")]
+    rows = [
+        (
+            line.quantity,
+            line.reference or "-",
+            f"{line.numbers:,}",
+            *(f"{errors.worst:.2f}" for errors in (line.urdfkin, line.pinocchio)),
+            *(f"{errors.typical:.3f}" for errors in (line.urdfkin, line.pinocchio)),
+        )
+        for line in lines
+    ]
+    return table(("quantity", "reference", "numbers", *sides), rows, left=2)
+
+
+# -- enclosures --------------------------------------------------------------------------------------------
+
+#: Robots whose enclosures are measured: arms, a hand with mimic joints, humanoids, a quadruped, a hobby arm.
+PROVEN = ("panda", "ur5", "xarm7", "allegro_left_hand", "talos", "icub", "anymal", "so100")
+#: Numbers of joints of the chains with oblique axes.
+LENGTHS = (3, 10, 30, 100)
+
+
+def enclosures() -> dict[str, str]:
+    """Measure the width of the intervals of robots and of long chains."""
+    heads = ("robot", "joints", "digits", "widest, steps", "urdfkin inside", "Pinocchio inside", "ms")
+    long = ("joints", "digits", "acceleration", "widest interval", "ms")
+    with only("compiled"):
+        robots = table(heads, _of_robots(), left=1)
+        return {
+            "robots": f"{ENCLOSED} samples, Pinocchio {version()}:\n\n{robots}",
+            "chains": table(long, _of_chains(), left=0),
+        }
+
+
+def _of_robots() -> Iterator[tuple[object, ...]]:
+    for name in PROVEN:
+        robot = urdfkin.load(name)
+        depth = len(robot.tree.path(robot.tree.frame_link(robot.tip_frame)))
+        _proof(robot, 0, None)
+        for digits in (15, None):
+            begin = time.process_time()
+            proofs = [_proof(robot, seed, digits) for seed in range(ENCLOSED)]
+            ms = 1e3 * (time.process_time() - begin) / ENCLOSED
+            parts = [part for proof in proofs for part in _parts(proof)]
+            steps = max(float((part.width / np.spacing(_largest(part))).max()) for part in parts)
+            inside = [_inside(parts, side) for side in ("urdfkin", "pinocchio")]
+            yield name, depth, proofs[0].digits, f"{steps:.3g}", *inside, f"{ms:.1f}"
+
+
+def _of_chains() -> Iterator[tuple[object, ...]]:
+    for length in LENGTHS:
+        robot = urdfkin.load(askew(length), verify=False)
+        _proof(robot, 0, None)
+        for digits in (15, 50, None):
+            begin = time.process_time()
+            proof = _proof(robot, 0, digits)
+            ms = 1e3 * (time.process_time() - begin)
+            size = float(np.abs(proof.acceleration.urdfkin).max())
+            widest = float(proof.acceleration.width.max())
+            yield length, proof.digits, f"{size:.1e}", f"{widest:.1e}", f"{ms:.1f}"
+
+
+def _proof(robot: Robot, seed: int, digits: int | None) -> Enclosures:
+    v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))
+    return robot.enclose(robot.sample(1, seed)[0], v, a, robot.tip_frame, digits=digits)
+
+
+def _parts(proof: Enclosures) -> tuple[Enclosure, ...]:
+    return proof.placement, proof.velocity, proof.acceleration, proof.jacobian, proof.jacobian_rate
+
+
+def _largest(part: Enclosure) -> float:
+    """Return the largest absolute value of the ends of all intervals."""
+    return float(np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300))
+
+
+def _inside(parts: list[Enclosure], side: str) -> str:
+    """Return the fraction of a library's numbers that lie in their proven intervals.
+
+    Numbers with an interval of width 0 are left out.
+    """
+    found = [part.contains(getattr(part, side))[part.width > 0.0] for part in parts]
+    return f"{np.concatenate(found).mean():.0%}"
+
+
+def askew(length: int) -> str:
+    """Return a chain of continuous joints with oblique axes."""
+    joints = "".join(
+        f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
+        f'<child link="l{i + 1}"/><origin xyz="0.1 0.2 0.3" rpy="1.5708 0.3 -0.2"/>'
+        '<axis xyz="0.36 0.48 0.8"/></joint>'
+        for i in range(length)
+    )
+    return f'<robot name="askew"><link name="l0"/>{joints}</robot>'
+
+
+# -- all pages ---------------------------------------------------------------------------------------------
+
+#: For each page: the function that returns its generated parts.
+PARTS: dict[str, Callable[[], dict[str, str]]] = {
+    "findings": findings,
+    "reports": reports,
+    "judge": study,
+    "enclosures": enclosures,
+}
+PAGES = ("equations", "performance", *PARTS)
+FIGURES, PICTURE = DOCS / "performance.json", DOCS / "images" / "performance.svg"
+
+
+def path_of(name: str) -> Path:
+    """Return the path of a page."""
+    return DOCS / f"{name}.md"
+
+
+def page(name: str) -> str:
+    """Return the text of a page with current parts. The page of the equations is generated as a whole."""
+    if name == "equations":
+        return equations()
+    text = path_of(name).read_text("utf-8")
+    if name == "performance":
+        return tables.page(text, json.loads(FIGURES.read_text("utf-8")))
+    return inserted(text, **PARTS[name]())
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Write the pages."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("pages", nargs="*", choices=[*PAGES, []], metavar="PAGE", help="default: all pages")
+    for name in parser.parse_args(words).pages or PAGES:
+        path_of(name).write_text(page(name), "utf-8")
+        print(path_of(name))
+        if name == "performance":
+            PICTURE.write_bytes(draw(json.loads(FIGURES.read_text("utf-8")), PICTURE))
+
+
+if __name__ == "__main__":
+    main()
