@@ -77,7 +77,8 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
     assert set(kinds) - ({ast.ClassDef} if classes else set()) <= allowed
     assert kinds.count(ast.Expr) == 1, "the docstring"
     checked = ["_demand", "_stacked"]
-    helpers = {"numpy": ["_demand"], "array": ["_namespace", *checked], "jax": checked, "torch": checked}
+    helpers = {"numpy": ["_demand"], "casadi": ["_demand"], "array": ["_namespace", *checked]}
+    helpers |= {"jax": checked, "torch": checked}
     assert [node.name for node in module.body if isinstance(node, ast.FunctionDef)] == [
         *helpers.get(to, []),
         "placement",
