@@ -8,8 +8,7 @@ median of several launches. The share of the memory's bandwidth is the number of
 reads and writes, divided by the bytes that a copy in the GPU's memory reads and writes in the same time. If
 PyTorch with CUDA is installed, its export is measured too, called directly and by `torch.compile`.
 
-nvcc of the package registry is enough; all its packages must have one version:
-pip install nvidia-cuda-nvcc nvidia-nvvm nvidia-cuda-crt nvidia-cuda-runtime nvidia-cuda-cccl
+nvcc of the package registry is enough: `make nvcc` installs it into the checkout's environment.
 
 Exit 1: a number is outside its bound. 2: no GPU, no nvcc, or the program does not compile.
 """
@@ -50,9 +49,10 @@ _MEASURED = r"""    std::printf("{\"by\": \"urdfkin\", \"quantity\": \"@name@\",
 
 
 def nvcc() -> str | None:
-    """Return the path of CUDA's compiler, on the PATH or from a package of this interpreter."""
+    """Return the path of CUDA's compiler: on the PATH, of `make nvcc`, or of a package here."""
     packages = Path(sysconfig.get_path("purelib"), "nvidia").glob("cu*/bin/nvcc")
-    return shutil.which("nvcc") or next(map(str, sorted(packages)), None)
+    made = Path(sys.prefix, "nvcc", "bin")
+    return shutil.which("nvcc") or shutil.which("nvcc", path=made) or next(map(str, sorted(packages)), None)
 
 
 def gpus() -> int:
@@ -174,7 +174,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--compile-only", action="store_true", help="compile the programs, and run none")
     arguments = parser.parse_args(words)
     if (compiler := nvcc()) is None:
-        return _refused("nvcc is not installed. Install CUDA, or nvcc of the package registry.")
+        return _refused("nvcc is not installed. Install CUDA, or run `make nvcc`.")
     if not arguments.compile_only and not gpus():
         return _refused("CUDA's driver finds no GPU here. Run on a machine with one, or use --compile-only.")
     robot = urdfkin.load(arguments.robot)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -20,7 +21,18 @@ from urdfkin.export.check import check
 
 #: The folder with a `cuda_runtime.h` for the processor.
 _SHIM = Path(__file__).parent
-_NVCC = pytest.mark.skipif(shutil.which("nvcc") is None, reason="no nvcc")
+_COMPILER = benchmark_gpu.nvcc()
+_NVCC = pytest.mark.skipif(
+    _COMPILER is None, reason="no nvcc; `make nvcc` installs it from the package registry"
+)
+
+
+@pytest.fixture
+def nvcc(monkeypatch: pytest.MonkeyPatch) -> str:
+    """CUDA's compiler, which is on the PATH during a test."""
+    assert _COMPILER is not None
+    monkeypatch.setenv("PATH", f"{Path(_COMPILER).parent}{os.pathsep}{os.environ['PATH']}")
+    return _COMPILER
 
 
 def ran(path: Path, *options: str) -> str:
@@ -108,12 +120,12 @@ def test_a_batch_of_any_size_has_the_bits_of_single_configurations(blocks: str, 
 @_NVCC
 @pytest.mark.long
 @pytest.mark.parametrize("real", ["double", "float"])
-def test_cudas_compiler_compiles_it_without_a_warning(real: str, tmp_path: Path) -> None:
+def test_cudas_compiler_compiles_it_without_a_warning(nvcc: str, real: str, tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), "cuda", tmp_path)
     name, built = path.stem.upper(), tmp_path / "check"
     macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
     strict = ["-Xcompiler", "-Wall,-Wextra,-Werror", "-Werror", "all-warnings"]
-    subprocess.run(["nvcc", *strict, *macros, "-x", "cu", str(path), "-o", str(built)], check=True)
+    subprocess.run([nvcc, *strict, *macros, "-x", "cu", str(path), "-o", str(built)], check=True)
     said = subprocess.run([str(built)], capture_output=True, text=True, check=True).stdout
     assert said.count("good ") >= 2  # without a GPU, only the functions of the host
     assert "WRONG" not in said
@@ -172,6 +184,7 @@ def test_cudas_compiler_compiles_the_benchmark(capsys: pytest.CaptureFixture[str
 
 @_NVCC
 @pytest.mark.long
+@pytest.mark.usefixtures("nvcc")
 def test_the_check_takes_cudas_compiler_where_there_is_a_gpu(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -183,6 +196,7 @@ def test_the_check_takes_cudas_compiler_where_there_is_a_gpu(
 
 @_NVCC
 @pytest.mark.long
+@pytest.mark.usefixtures("nvcc")
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
 def test_the_cmake_lines_of_the_file_build_its_library_for_a_program_in_c(tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)
