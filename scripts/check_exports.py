@@ -2,6 +2,7 @@
 
     python scripts/check_exports.py --keep leaves.jsonl         # every leaf; continues a stopped run
     python scripts/check_exports.py --ways array --keep array.jsonl  # every leaf, in some languages only
+    python scripts/check_exports.py --ways sympy-exact --keep exact.jsonl  # in exact numbers
     python scripts/check_exports.py --keep leaves.jsonl --tell  # print the stored results only
     python scripts/check_exports.py --tips       # only the leaf with the longest path of each robot
     python scripts/check_exports.py --sizes      # write the sizes of the code to docs/export.md
@@ -14,8 +15,9 @@
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
 compared with results at fifty digits. The code runs with GCC and Clang if they are installed, for one
 configuration and in batches. It also runs with NumPy, and with NumPy as an array API namespace, in both
-precisions. GCC compiles CUDA's host functions. Exit 1: a number is outside the derived bound, or a compiler
-prints a warning.
+precisions. GCC compiles CUDA's host functions. The leaves come in a random order, always the same one, so
+that a stopped run has checked a sample. Exit 1: a number is outside the derived bound, or a compiler prints a
+warning.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import random
 import re
 import shutil
 import subprocess
@@ -38,7 +41,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 import urdfkin
 from scripts.benchmarking.subject import chain_urdf
 from scripts.pages import inserted
-from urdfkin.export import LANGUAGES, QUANTITIES, write
+from urdfkin.export import LANGUAGES, QUANTITIES, code_in, write
 from urdfkin.export.code import Code, code_of
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
@@ -51,6 +54,8 @@ _COMPILED = (
     ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])),
 )
 _WAYS = ("c", "cuda", "numpy", "array")
+#: Languages that are checked only if `--ways` names them.
+_NAMED = ("sympy-exact",)
 #: Largest nv of a robot whose Hessian is exported. The Hessian is compared with derivatives of the Jacobian.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
@@ -77,9 +82,12 @@ def shares(written: Code, folder: Path, ways: Collection[str]) -> Iterator[tuple
                 done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
                 found = [float(share) for share in _SHARE.findall(done.stdout)]
                 yield f"{compiler} {real}", _largest(found, len(written.functions))
-    for to in sorted({"numpy", "array"} & set(ways)):
+    for to in sorted({"numpy", "array", "sympy-exact"} & set(ways)):
         scope: dict[str, Any] = {"__name__": "robot"}
-        exec(compile(write(written, to), "robot.py", "exec"), scope)
+        own = code_in(written, to)
+        if not own.proof.certificate.verified:
+            yield f"{to} unverified", float("nan")
+        exec(compile(write(own, to), "robot.py", "exec"), scope)
         checked: dict[tuple[str, str], float] = scope["check"]()
         for kind in {kind for _, kind in checked}:
             found = [share for (_, of), share in checked.items() if of == kind]
@@ -94,16 +102,20 @@ def _largest(found: Sequence[float], count: int) -> float:
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     """Yield robots and frames.
 
-    The main tip of each robot comes first. A run that is stopped early has then checked one frame of each
-    robot.
+    The main tip of each robot comes first. The other leaves follow in a fixed random order. A run that is stopped
+    early has then checked one frame of each robot, and a sample of the leaves.
     """
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
-    for name, robot in robots.items() if not tips else ():
-        for leaf in robot.tree.leaves():
-            if (frame := robot.tree.frame_name(leaf)) != robot.tip_frame:
-                yield name, robot, frame
+    frames = [
+        (name, robot, frame)
+        for name, robot in (() if tips else robots.items())
+        for frame in map(robot.tree.frame_name, robot.tree.leaves())
+        if frame != robot.tip_frame
+    ]
+    random.Random(0).shuffle(frames)
+    yield from frames
 
 
 def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
@@ -242,7 +254,9 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--sizes", action="store_true", help="write the sizes of the code of three robots into docs/export.md"
     )
-    parser.add_argument("--ways", nargs="+", choices=_WAYS, default=_WAYS, help="only these languages")
+    parser.add_argument(
+        "--ways", nargs="+", choices=(*_WAYS, *_NAMED), default=_WAYS, help="only these languages"
+    )
     parser.add_argument("--library", choices=("torch", "jax"), help="check the tips in this library")
     parser.add_argument("--environment", type=Path, help="folder of the library's virtual environment")
     parser.add_argument("--package", help="what pip installs, for example torch==2.13.0+cpu")

@@ -418,8 +418,6 @@ def write(code: Code, to: str) -> str:
     The module also contains a check, which `python FILE` runs.
     """
     dialect = DIALECTS[to]
-    if dialect.exact and code.exact is not None:
-        code = code.exact()
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [
         '"""' + code.head[0],
