@@ -35,7 +35,7 @@ def nvcc(monkeypatch: pytest.MonkeyPatch) -> str:
     return _COMPILER
 
 
-def ran(path: Path, *options: str) -> str:
+def ran(path: Path, *options: str, status: int = 0) -> str:
     """What a program says whose kernels run on the processor, with every warning and bad access an error."""
     if shutil.which("g++") is None:
         pytest.skip("no g++")
@@ -45,7 +45,7 @@ def ran(path: Path, *options: str) -> str:
     command = ["g++", *language, *strict, *options, "-x", "c++", str(path), "-o", str(built)]
     subprocess.run(command, check=True)
     done = subprocess.run([str(built)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == status, done.stdout + done.stderr
     return done.stdout
 
 
@@ -81,6 +81,28 @@ def test_so_do_those_of_wide_rows_of_other_joints_and_of_no_joint(
     path = file(code(subject, quantities=quantities), "cuda", tmp_path)
     said = ran(path, "-fsanitize=address,undefined", f"-D{path.stem.upper()}_MAIN")
     assert said.count("good ") == 2 * len(quantities)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("? tile.row[lane][k] : T(0.0)", "? tile.row[0][k] : T(0.0)"),
+        ("tile.row[lane][k] = own[first + k]", "tile.row[lane][k] = own[k]"),
+        ("WIDTH + first + i % piece] = tile", "WIDTH + i % piece] = tile"),
+        ("blockIdx.x) * THREADS + threadIdx.x / WARP * WARP", "blockIdx.x) * THREADS"),
+        ("return cudaLaunchKernel(", "return 1 + cudaLaunchKernel("),
+        ("results);\n        write_rows", "results); results[7] *= T(1.0001);\n        write_rows"),
+    ],
+)
+def test_a_changed_kernel_fails_the_check_on_the_gpu_only(right: str, wrong: str, tmp_path: Path) -> None:
+    path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)
+    text = path.read_text("utf-8")
+    assert text.count(right) == 1
+    path.write_text(text.replace(right, wrong), "utf-8")
+    said = ran(path, f"-D{path.stem.upper()}_MAIN", status=1)
+    assert re.search(r"^good jacobian: ", said, re.MULTILINE)
+    assert re.search(r"^WRONG jacobian on the GPU: ", said, re.MULTILINE)
 
 
 _SIZES = """

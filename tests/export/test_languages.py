@@ -93,14 +93,15 @@ def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_the_end(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "numpy", "array", "sympy-exact"])
-def test_so_does_that_of_planar_and_floating_joints(to: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("to", ["c", "cuda", "numpy", "array", "torch", "sympy-exact"])
+@pytest.mark.parametrize("name", ["planar_and_floating_in_the_middle", "sizes", "mimic_hand_40_sliding"])
+def test_so_does_that_of_other_joints_of_odd_sizes_and_of_a_hand(to: str, name: str, tmp_path: Path) -> None:
     need(to)
     # A Hessian of so many rates takes a compiler half a minute.
-    asked = tuple(name for name in ALL if name != "hessian" or to != "c")
-    found = check(file(code(robot_of("planar_and_floating_in_the_middle"), quantities=asked), to, tmp_path))
+    asked = tuple(row for row in ALL if row != "hessian" or to in ("numpy", "array", "sympy-exact"))
+    found = check(file(code(robot_of(name), quantities=asked), to, tmp_path))
     assert found.good, found.lines
-    assert len(found.lines) == len(asked) * (2 if to in BOTH else 1)
+    assert len(found.lines) == len(asked) * (3 if to == "torch" else 2 if to in BOTH else 1)
 
 
 @pytest.mark.slow
@@ -167,7 +168,7 @@ def test_an_option_that_lets_a_compiler_reorder_sums_is_refused(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "cpp", "cuda", "numpy", "array", "torch", "sympy-exact"])
+@pytest.mark.parametrize("to", RUN)
 def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None:
     need(to)
     path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), to, tmp_path)
@@ -179,6 +180,29 @@ def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None
     assert not found.good
     assert any(line.startswith("WRONG placement") for line in found.lines)
     assert any(line.startswith("good acceleration") for line in found.lines)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("to", ["numpy", "array", "torch", "sympy-exact"])
+def test_every_constant_of_a_function_is_noticed_if_it_is_changed_by_a_billionth(
+    to: str, tmp_path: Path
+) -> None:
+    need(to)
+    text = file(code(robot_of("panda"), quantities=_THREE), to, tmp_path).read_text("utf-8")
+    functions = [x for x in ast.parse(text).body if isinstance(x, ast.FunctionDef) and x.name in _THREE]
+    lines, changed = text.splitlines(keepends=True), 0
+    for node in (node for function in functions for node in ast.walk(function)):
+        fraction = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Rational"
+        if fraction == (to == "sympy-exact") and (fraction or isinstance(getattr(node, "value", 0), float)):
+            assert isinstance(node, ast.expr)
+            row, first, last = node.lineno - 1, node.col_offset, node.end_col_offset
+            line = lines[row]
+            other = f"({line[first:last]} + 1e-9)"
+            scope: dict[str, Any] = {"__name__": "changed"}
+            exec("".join([*lines[:row], line[:first] + other + line[last:], *lines[row + 1 :]]), scope)
+            assert max(scope["check"]().values()) > 1.0, line
+            changed += 1
+    assert changed > 20
 
 
 @pytest.mark.slow
