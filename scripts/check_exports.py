@@ -56,7 +56,8 @@ _COMPILED = (
 _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)
-#: Largest nv of a robot whose Hessian is exported. The Hessian is compared with derivatives of the Jacobian.
+#: Largest nv of a robot whose Hessian is in the file of a library. PyTorch's own check of a larger one takes
+#: hours. All files for any array library have it, to compare it with derivatives of the Jacobian.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -184,10 +185,10 @@ def _files(library: str, folder: Path) -> Iterator[Path]:
     """Write two files for each tip: one in a library's export format, and one in the format `array`."""
     for number, (_, robot, frame) in enumerate(subjects(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
-        if 0 < robot.nv <= _HESSIANS and all(joint.nv <= 1 for joint in robot.tree.joints):
-            wanted = (*wanted, "hessian")
-        written = code(robot, frame, wanted)
+        differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)
         for to in (library, "array"):
+            hessian = differentiable and (to == "array" or robot.nv <= _HESSIANS)
+            written = code(robot, frame, (*wanted, "hessian") if hessian else wanted)
             path = folder / f"{written.name}_{number}{LANGUAGES[to][1]}"
             path.write_text(write(written, to), encoding="utf-8")
             yield path

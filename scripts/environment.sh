@@ -41,6 +41,7 @@ make_environment() {
 # two minutes, or does not compile a kernel with this system's compiler.
 install_nvcc() {
     [ ! -x .venv/nvcc/bin/nvcc ] || return 0
+    [ -x .venv/bin/pip ] || { echo "there is no .venv; first run make setup" >&2 && return 1; }
     echo "installing CUDA's compiler into .venv/nvcc (280 MB)" >&2
     new=$(mktemp -d .venv/nvcc.XXXXXX) || return 1
     if timeout 120 .venv/bin/pip install --quiet --disable-pip-version-check --retries 1 --timeout 20 --no-deps \
