@@ -9,6 +9,7 @@ import shutil
 import subprocess
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +18,7 @@ from scripts import benchmark_gpu
 from tests.export.writing import ALL, code, file
 from tests.laws.subjects import robot_of
 from urdfkin.export import check as checking
+from urdfkin.export import write
 from urdfkin.export.check import check
 
 #: The folder with a `cuda_runtime.h` for the processor.
@@ -183,6 +185,42 @@ def test_the_share_of_the_bandwidth_counts_the_bytes_of_inputs_and_results() -> 
     assert found["share"] == pytest.approx(0.1)
     with pytest.raises(ValueError, match="no bandwidth"):
         list(benchmark_gpu.rows(written, [json.dumps(row)]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [None, "export", "PyTorch Kinematics"])
+def test_the_benchmark_measures_libraries_of_pytorch_after_a_check(
+    wrong: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch: Any = pytest.importorskip("torch")
+    pytest.importorskip("pytorch_kinematics")
+    monkeypatch.setattr(benchmark_gpu, "SIZES", (1, 3))
+    monkeypatch.setattr(benchmark_gpu, "LAUNCHES", 1)
+    monkeypatch.setattr(torch, "compile", lambda function: function)
+    robot = urdfkin.load("planar_two_link")
+    written = code(robot, quantities=("placement", "jacobian"))
+    if wrong == "export":
+        text = write(written, "torch").replace("0.4", "0.41", 1)
+        monkeypatch.setattr(benchmark_gpu, "write", lambda code, to: text)
+    elif wrong:
+        monkeypatch.setattr(benchmark_gpu, "positions", lambda ours, theirs: [1, 0])
+    found = benchmark_gpu.of_torch(robot, "tip", written, "cpu")
+    if wrong:
+        with pytest.raises(ValueError, match=wrong):
+            list(found)
+        return
+    rows = list(benchmark_gpu.rows(written, [json.dumps({"bandwidth": 1e9}), *found]))
+    by = {
+        "placement": ("PyTorch", "torch.compile"),
+        "jacobian": ("PyTorch", "torch.compile", "PyTorch Kinematics"),
+    }
+    assert [(x["quantity"], x["by"], x["real"], x["n"]) for x in rows] == [
+        (name, who, real, n)
+        for name, whos in by.items()
+        for who in whos
+        for real in ("double", "float")
+        for n in (1, 3)
+    ]
 
 
 @pytest.mark.parametrize(
