@@ -210,7 +210,7 @@ def _seconds(call: Callable[[], Any], device: str) -> float:
     """Return the median time of a call, in seconds, after three calls to warm up."""
     import torch  # noqa: PLC0415  optional
 
-    times = []
+    times = list[float]()
     for _ in range(LAUNCHES + 3):
         if device == "cuda":
             start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))

@@ -56,8 +56,9 @@ _COMPILED = (
 _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)
-#: Largest nv of a robot whose Hessian is in the file of a library. PyTorch's own check of a larger one takes
-#: hours. All files for any array library have it, to compare it with derivatives of the Jacobian.
+#: Largest nv of a robot whose file for a library has a Hessian, to compare it with derivatives of the
+#: Jacobian: PyTorch's gradcheck computes the derivatives of each number. The files for any array library have
+#: it for each nv if they run in PyTorch. JAX compiles the stack of its numbers for minutes.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -187,7 +188,7 @@ def _files(library: str, folder: Path) -> Iterator[Path]:
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)
         for to in (library, "array"):
-            hessian = differentiable and (to == "array" or robot.nv <= _HESSIANS)
+            hessian = differentiable and (robot.nv <= _HESSIANS if to == library else library == "torch")
             written = code(robot, frame, (*wanted, "hessian") if hessian else wanted)
             path = folder / f"{written.name}_{number}{LANGUAGES[to][1]}"
             path.write_text(write(written, to), encoding="utf-8")

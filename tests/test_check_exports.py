@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -77,7 +78,8 @@ def test_leaves_come_in_one_random_order_after_the_tips(monkeypatch: pytest.Monk
 
 @pytest.mark.slow
 def test_exact_code_is_checked_with_its_own_proof(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, made = urdfkin.load("planar_two_link"), exact.exact_functions
+    robot = urdfkin.load("planar_two_link")
+    made: Any = exact.exact_functions
     found = check_exports.found_of(robot, "tip", ["sympy-exact"])
     assert found.pop("good")
     assert 0.0 <= found.pop("sympy-exact float64") < 1e-30

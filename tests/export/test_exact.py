@@ -136,7 +136,7 @@ def test_the_command_states_the_proof_of_the_exact_expressions(tmp_path: Path) -
 def test_the_command_reports_exact_expressions_that_were_not_compared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = exact_module.exact_functions
+    made: Any = exact_module.exact_functions
 
     def unchecked(*given: Any) -> Any:
         return made(*given[:-1], False)  # the expressions in double precision were compared
