@@ -104,8 +104,8 @@ def _largest(found: Sequence[float], count: int) -> float:
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     """Yield robots and frames.
 
-    The main tip of each robot comes first. The other leaves follow in a fixed random order. A run that is stopped
-    early has then checked one frame of each robot, and a sample of the leaves.
+    The main tip of each robot comes first. The other leaves follow in a fixed random order. A run that is
+    stopped early has then checked one frame of each robot, and a sample of the leaves.
     """
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
