@@ -1,12 +1,15 @@
 # The loop of whoever changes urdfkin; CONTRIBUTING.md says when to run what.
 PATH := $(CURDIR)/.venv/bin:$(PATH)
-.PHONY: help setup format check fast test long search docs site bench
+.PHONY: help setup nvcc format check fast test long search docs site bench
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
 
 setup:  ## .venv with urdfkin and all that its tests need
 	sh -c '. scripts/environment.sh; make_environment "[test]"' scripts/setup
+
+nvcc:  ## CUDA's compiler in .venv/nvcc, for the long tests of exported code and scripts/benchmark_gpu.py
+	sh -c '. scripts/environment.sh; install_nvcc' scripts/setup
 
 format:  ## write Python as it is written here
 	ruff format .

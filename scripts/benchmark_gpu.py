@@ -6,10 +6,10 @@
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
 median of several launches. The share of the memory's bandwidth is the number of bytes that a configuration
 reads and writes, divided by the bytes that a copy in the GPU's memory reads and writes in the same time. If
-PyTorch with CUDA is installed, its export is measured too, called directly and by `torch.compile`.
+PyTorch with CUDA is installed, its export is measured too, called directly and by `torch.compile`; if PyTorch
+Kinematics is installed, its Jacobian. Their numbers are checked before their times.
 
-nvcc of the package registry is enough; all its packages must have one version:
-pip install nvidia-cuda-nvcc nvidia-nvvm nvidia-cuda-crt nvidia-cuda-runtime nvidia-cuda-cccl
+nvcc of the package registry is enough: `make nvcc` installs it into the checkout's environment.
 
 Exit 1: a number is outside its bound. 2: no GPU, no nvcc, or the program does not compile.
 """
@@ -17,7 +17,9 @@ Exit 1: a number is outside its bound. 2: no GPU, no nvcc, or the program does n
 from __future__ import annotations
 
 import argparse
+import copy
 import ctypes
+import importlib.util
 import json
 import shutil
 import statistics
@@ -25,23 +27,31 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
+from scripts.benchmarking.peers import positions
 from scripts.pages import table as markdown
 from urdfkin.export import QUANTITIES, write
 from urdfkin.export.code import Code
 from urdfkin.export.forms import code_of_robot
 from urdfkin.export.function import Function
+from urdfkin.robot import Robot
 
 #: Sizes of batches, and the number of measured launches of each.
 SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
+#: Largest difference of a Jacobian of PyTorch Kinematics, which reads a URDF's angles in single precision.
+_MOST = {"double": 1e-6, "float": 1e-4}
 
 _PROGRAM = Path(__file__).parent / "benchmarking" / "gpu.cu"
 _MEASURED = r"""    std::printf("{\"by\": \"urdfkin\", \"quantity\": \"@name@\", \"real\": \"%s\", ", real);
@@ -50,9 +60,10 @@ _MEASURED = r"""    std::printf("{\"by\": \"urdfkin\", \"quantity\": \"@name@\",
 
 
 def nvcc() -> str | None:
-    """Return the path of CUDA's compiler, on the PATH or from a package of this interpreter."""
+    """Return the path of CUDA's compiler: on the PATH, of `make nvcc`, or of a package here."""
     packages = Path(sysconfig.get_path("purelib"), "nvidia").glob("cu*/bin/nvcc")
-    return shutil.which("nvcc") or next(map(str, sorted(packages)), None)
+    made = Path(sys.prefix, "nvcc", "bin")
+    return shutil.which("nvcc") or shutil.which("nvcc", path=made) or next(map(str, sorted(packages)), None)
 
 
 def gpus() -> int:
@@ -137,29 +148,78 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
     return markdown(heads, rows, left=3)
 
 
-def of_torch(code: Code) -> Iterator[str]:
-    """Yield the measurements of PyTorch's export on the GPU as JSON lines; none without PyTorch and CUDA."""
+def of_torch(robot: Robot, frame: str, code: Code, device: str = "cuda") -> Iterator[str]:
+    """Yield the measurements of PyTorch's export, and of PyTorch Kinematics, as JSON lines.
+
+    There are none without PyTorch and its device.
+
+    Raises:
+        ValueError: a library computes a wrong number.
+    """
     try:
         import torch  # noqa: PLC0415  optional
     except ModuleNotFoundError:
         return
-    if not torch.cuda.is_available():
+    if device == "cuda" and not torch.cuda.is_available():
         return
     scope: dict[str, Any] = {"__name__": "measured"}
     exec(compile(write(code, "torch"), "<torch>", "exec"), scope)
+    if not max(scope["check"](device).values()) <= 1.0:
+        raise ValueError("PyTorch's export computes a number outside its bound")
     for function in code.functions:
-        ways = {"PyTorch": scope[function.name], "torch.compile": torch.compile(scope[function.name])}
-        for (by, call), real, n in ((x, real, n) for x in ways.items() for real in _BYTES for n in SIZES):
-            kind = {"dtype": getattr(torch, real), "device": "cuda"}
+        call = scope[function.name]
+        ways: list[tuple[str, Callable[..., Any]]] = [
+            ("PyTorch", call),
+            ("torch.compile", torch.compile(call)),
+        ]
+        if function.name == "jacobian" and importlib.util.find_spec("pytorch_kinematics"):
+            ways.append(("PyTorch Kinematics", _chain(robot, frame, device)))
+        for (by, call), real, n in ((x, real, n) for x in ways for real in _BYTES for n in SIZES):
+            kind = {"dtype": getattr(torch, real), "device": device}
             inputs = [torch.rand((n, width), **kind) for width in code.widths(function).values()]
-            times = []
-            for _ in range(LAUNCHES + 3):
-                start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
-                start.record(), call(*inputs), end.record()
-                end.synchronize()
-                times.append(1e-3 * start.elapsed_time(end))
-            time = statistics.median(times[3:])
-            yield json.dumps({"by": by, "quantity": function.name, "real": real, "n": n, "s": time})
+            found = _seconds(partial(call, *inputs), device)
+            yield json.dumps({"by": by, "quantity": function.name, "real": real, "n": n, "s": found})
+
+
+def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
+    """Return the function of PyTorch Kinematics that computes the Jacobian's columns of the path.
+
+    Raises:
+        ValueError: it computes another Jacobian than `robot`.
+    """
+    import pytorch_kinematics  # noqa: PLC0415  optional
+    import torch  # noqa: PLC0415
+
+    chain = pytorch_kinematics.build_serial_chain_from_urdf(robot.urdf, frame)
+    names = chain.get_joint_parameter_names()
+    if not set(names) <= set(robot.joint_names):
+        raise ValueError(f"PyTorch Kinematics has other joints: {', '.join(names)}")
+    columns, chains, q = positions(robot.joint_names, names), {}, robot.sample(16, seed=0)
+    for real, most in _MOST.items():
+        kind = getattr(torch, real)
+        chains[kind] = copy.deepcopy(chain).to(dtype=kind, device=device)
+        found = chains[kind].jacobian(torch.tensor(q[:, columns], dtype=kind, device=device))
+        if not np.abs(found.cpu().numpy() - robot.jacobian(q, frame)[..., columns]).max() <= most:
+            raise ValueError(f"PyTorch Kinematics computes another Jacobian in {real} precision")
+    return lambda q: chains[q.dtype].jacobian(q[:, columns])
+
+
+def _seconds(call: Callable[[], Any], device: str) -> float:
+    """Return the median time of a call, in seconds, after three calls to warm up."""
+    import torch  # noqa: PLC0415  optional
+
+    times = list[float]()
+    for _ in range(LAUNCHES + 3):
+        if device == "cuda":
+            start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
+            start.record(), call(), end.record()
+            end.synchronize()
+            times.append(1e-3 * start.elapsed_time(end))
+        else:
+            before = time.perf_counter()
+            call()
+            times.append(time.perf_counter() - before)
+    return statistics.median(times[3:])
 
 
 def main(words: list[str] | None = None) -> int:
@@ -172,7 +232,7 @@ def main(words: list[str] | None = None) -> int:
     option("--compile-only", action="store_true", help="compile the programs, and run none")
     arguments = parser.parse_args(words)
     if (compiler := nvcc()) is None:
-        return _refused("nvcc is not installed. Install CUDA, or nvcc of the package registry.")
+        return _refused("nvcc is not installed. Install CUDA, or run `make nvcc`.")
     if not arguments.compile_only and not gpus():
         return _refused("CUDA's driver finds no GPU here. Run on a machine with one, or use --compile-only.")
     robot = urdfkin.load(arguments.robot)
@@ -192,11 +252,17 @@ def main(words: list[str] | None = None) -> int:
                 print(f"the check in {real} precision failed on the GPU: {done.stderr}", file=sys.stderr)
                 return 1
         lines = subprocess.run([str(programs["measure"])], capture_output=True, text=True, check=True).stdout
-    measured = list(rows(code, [*lines.splitlines(), *of_torch(code)]))
+    found, status = lines.splitlines(), 0
+    try:
+        found.extend(of_torch(robot, arguments.frame or robot.tip_frame, code))
+    except ValueError as error:
+        print(f"benchmark_gpu.py: {error}", file=sys.stderr)
+        status = 1
+    measured = list(rows(code, found))
     print(table(measured))
     if arguments.json:
         arguments.json.write_text("".join(f"{json.dumps(row)}\n" for row in measured), encoding="utf-8")
-    return 0
+    return status
 
 
 def _refused(reason: str) -> int:

@@ -2,6 +2,7 @@
 
     python scripts/check_exports.py --keep leaves.jsonl         # every leaf; continues a stopped run
     python scripts/check_exports.py --ways array --keep array.jsonl  # every leaf, in some languages only
+    python scripts/check_exports.py --ways sympy-exact --keep exact.jsonl  # in exact numbers
     python scripts/check_exports.py --tips       # only the leaf with the longest path of each robot
     python scripts/check_exports.py --sizes      # write the sizes of the code to docs/export.md
     python scripts/check_exports.py --library torch --environment /tmp/torch  # the tips, in PyTorch
@@ -13,8 +14,9 @@
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
 compared with results at fifty digits. The code runs with GCC and Clang if they are installed, for one
 configuration and in batches. It also runs with NumPy, and with NumPy as an array API namespace, in both
-precisions. GCC compiles CUDA's host functions. Exit 1: a number is outside the derived bound, or a compiler
-prints a warning.
+precisions. GCC compiles CUDA's host functions. The leaves come in a random order, always the same one, so
+that a stopped run has checked a sample. Exit 1: a number is outside the derived bound, or a compiler prints a
+warning.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import random
 import re
 import shutil
 import subprocess
@@ -38,7 +41,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 import urdfkin
 from scripts.benchmarking.subject import chain_urdf
 from scripts.pages import DOCS, inserted, table
-from urdfkin.export import LANGUAGES, QUANTITIES, write
+from urdfkin.export import LANGUAGES, QUANTITIES, code_in, write
 from urdfkin.export.code import Code
 from urdfkin.export.forms import code_of_robot
 from urdfkin.robot import Robot
@@ -52,7 +55,11 @@ _COMPILED = (
     ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])),
 )
 _WAYS = ("c", "cuda", "numpy", "array")
-#: Largest nv of a robot whose Hessian is exported. The Hessian is compared with derivatives of the Jacobian.
+#: Languages that are checked only if `--ways` names them.
+_NAMED = ("sympy-exact",)
+#: Largest nv of a robot whose file for a library has a Hessian, to compare it with derivatives of the
+#: Jacobian: PyTorch's gradcheck computes the derivatives of each number. The files for any array library have
+#: it for each nv if they run in PyTorch. JAX compiles the stack of its numbers for minutes.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -76,9 +83,12 @@ def shares(written: Code, folder: Path, ways: Collection[str]) -> Iterator[tuple
                 done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
                 found = [float(share) for share in _SHARE.findall(done.stdout)]
                 yield f"{compiler} {real}", _largest(found, len(written.functions))
-    for to in sorted({"numpy", "array"} & set(ways)):
+    for to in sorted({"numpy", "array", "sympy-exact"} & set(ways)):
         scope: dict[str, Any] = {"__name__": "robot"}
-        exec(compile(write(written, to), "robot.py", "exec"), scope)
+        own = code_in(written, to)
+        if not own.proof.certificate.verified:
+            yield f"{to} unverified", float("nan")
+        exec(compile(write(own, to), "robot.py", "exec"), scope)
         checked: dict[tuple[str, str], float] = scope["check"]()
         for kind in {kind for _, kind in checked}:
             found = [share for (_, of), share in checked.items() if of == kind]
@@ -93,16 +103,20 @@ def _largest(found: Sequence[float], count: int) -> float:
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
     """Yield robots and frames.
 
-    The main tip of each robot comes first. A run that is stopped early has then checked one frame of each
-    robot.
+    The main tip of each robot comes first. The other leaves follow in a fixed random order. A run that is
+    stopped early has then checked one frame of each robot, and a sample of the leaves.
     """
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
-    for name, robot in robots.items() if not tips else ():
-        for leaf in robot.tree.leaves():
-            if (frame := robot.tree.frame_name(leaf)) != robot.tip_frame:
-                yield name, robot, frame
+    frames = [
+        (name, robot, frame)
+        for name, robot in (() if tips else robots.items())
+        for frame in map(robot.tree.frame_name, robot.tree.leaves())
+        if frame != robot.tip_frame
+    ]
+    random.Random(0).shuffle(frames)
+    yield from frames
 
 
 def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
@@ -160,10 +174,10 @@ def _files(library: str, folder: Path) -> Iterator[Path]:
     """Write two files for each tip: one in a library's export format, and one in the format `array`."""
     for number, (_, robot, frame) in enumerate(subjects(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
-        if 0 < robot.nv <= _HESSIANS and all(joint.nv <= 1 for joint in robot.tree.joints):
-            wanted = (*wanted, "hessian")
-        written = code(robot, frame, wanted)
+        differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)
         for to in (library, "array"):
+            hessian = differentiable and (robot.nv <= _HESSIANS if to == library else library == "torch")
+            written = code(robot, frame, (*wanted, "hessian") if hessian else wanted)
             path = folder / f"{written.name}_{number}{LANGUAGES[to][1]}"
             path.write_text(write(written, to), encoding="utf-8")
             yield path
@@ -227,7 +241,7 @@ def main(words: Sequence[str] | None = None) -> int:
     option("--keep", type=Path, help="file for the results, one per line; an existing file is continued")
     option("--tips", action="store_true", help="check only one leaf link of each robot")
     option("--sizes", action="store_true", help="write the sizes of three robots' code into docs/export.md")
-    option("--ways", nargs="+", choices=_WAYS, default=_WAYS, help="only these languages")
+    option("--ways", nargs="+", choices=(*_WAYS, *_NAMED), default=_WAYS, help="only these languages")
     option("--library", choices=("torch", "jax"), help="check the tips in this library")
     option("--environment", type=Path, help="folder of the library's virtual environment")
     option("--package", help="what pip installs, for example torch==2.13.0+cpu")

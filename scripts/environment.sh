@@ -1,5 +1,6 @@
 # Sourced by try.sh, test.sh and test_long.sh: a virtual environment in .venv with urdfkin and the extras named in $1.
 # Needs a Python >= 3.11; installs Debian's python3-venv if the Python there cannot make environments.
+# install_nvcc adds CUDA's compiler.
 
 cd "$(dirname "$0")/.." || exit 2
 
@@ -34,4 +35,26 @@ make_environment() {
     .venv/bin/pip install --quiet --disable-pip-version-check -e ".$1" || exit 2
     PATH="$PWD/.venv/bin:$PATH"
     export PATH
+}
+
+# Install CUDA's compiler from the package registry into .venv/nvcc (280 MB). Return 1 if it does not install within
+# two minutes, or does not compile a kernel with this system's compiler.
+install_nvcc() {
+    [ ! -x .venv/nvcc/bin/nvcc ] || return 0
+    [ -x .venv/bin/pip ] || { echo "there is no .venv; first run make setup" >&2 && return 1; }
+    echo "installing CUDA's compiler into .venv/nvcc (280 MB)" >&2
+    new=$(mktemp -d .venv/nvcc.XXXXXX) || return 1
+    if timeout 120 .venv/bin/pip install --quiet --disable-pip-version-check --retries 1 --timeout 20 --no-deps \
+        --no-cache-dir --only-binary :all: --target "$new/packages" nvidia-cuda-nvcc==13.0.88 nvidia-nvvm==13.0.88 \
+        nvidia-cuda-crt==13.0.88 nvidia-cuda-runtime==13.0.96 nvidia-cuda-cccl==13.0.85 &&
+        cuda="$new/packages/nvidia/cu13" && ln -s lib "$cuda/lib64" && # the folder where nvcc searches for libraries
+        echo '__global__ void k() {} int main() { k<<<1, 1>>>(); }' >"$new/try.cu" &&
+        "$cuda/bin/nvcc" "$new/try.cu" -o "$new/try"; then
+        mv "$cuda" .venv/nvcc
+        status=$?
+    else
+        status=1
+    fi
+    rm -rf "$new"
+    return "$status"
 }

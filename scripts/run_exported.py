@@ -28,15 +28,16 @@ def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float
 
         jax.config.update("jax_enable_x64", True)
     any_library = path.endswith("_array.py")
-    checked = scope["check"](*([_namespace(library)] if any_library else []))
+    name, namespace = ("array", [_namespace(library)]) if any_library else (library, [])
+    checked = scope["check"](*namespace)
     for (_, kind), share in checked.items():
-        yield f"{'array' if any_library else library} {kind}", share
+        yield f"{name} {kind}", share
+    if "hessian" in scope["TRUE"]:
+        yield f"{name} gradient", of_hessian(scope, *(_torch if library == "torch" else _jax)())
     if any_library:
         return
     for good in scope.get("gradients", dict)().values():
         yield "gradcheck", 0.0 if good else float("inf")
-    if "hessian" in scope["TRUE"]:
-        yield f"{library} gradient", of_hessian(scope, *(_torch if library == "torch" else _jax)())
     if compiled and library == "torch":
         yield "torch.compile", of_compiled(scope)
 

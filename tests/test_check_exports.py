@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import urdfkin
 from scripts import check_exports
+from urdfkin.export import exact
 
 #: An interpreter whose library accepts every file; of each run it stores the files that it was given.
 _INTERPRETER = """#!/bin/sh
@@ -58,3 +60,29 @@ def test_a_number_outside_the_bound_fails_the_run_in_a_library(
     robot = urdfkin.load("planar_two_link")
     monkeypatch.setattr(check_exports, "subjects", lambda tips: iter([("arm", robot, "tip")]))
     assert check_exports.check_library("jax", environment(tmp_path, 1.5), None, None) == 1
+
+
+def test_leaves_come_in_one_random_order_after_the_tips(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(check_exports, "examples", lambda: ("hyq", "ur5"))
+    names = [(name, frame) for name, _, frame in check_exports.subjects(tips=False)]
+    tips = [(name, frame) for name, _, frame in check_exports.subjects(tips=True)]
+    robots = {name: urdfkin.load(name) for name in ("hyq", "ur5")}
+    in_order = [(name, x.tree.frame_name(leaf)) for name, x in robots.items() for leaf in x.tree.leaves()]
+    assert tips == [(name, robot.tip_frame) for name, robot in robots.items()]
+    assert names[:2] == tips
+    assert set(names) == {*in_order, *tips}
+    assert len(names) == len(set(names)) == 8
+    assert names == [(name, frame) for name, _, frame in check_exports.subjects(tips=False)]
+    assert names[2:] != [one for one in in_order if one not in tips]
+
+
+@pytest.mark.slow
+def test_exact_code_is_checked_with_its_own_proof(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = urdfkin.load("planar_two_link")
+    made: Any = exact.exact_functions
+    found = check_exports.found_of(robot, "tip", ["sympy-exact"])
+    assert found.pop("good")
+    assert 0.0 <= found.pop("sympy-exact float64") < 1e-30
+    assert not found
+    monkeypatch.setattr(exact, "exact_functions", lambda *given: made(*given[:-1], False))
+    assert not check_exports.found_of(robot, "tip", ["sympy-exact"])["good"]

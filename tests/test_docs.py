@@ -230,6 +230,55 @@ def test_the_command_of_the_tests_fails_if_one_of_its_parts_does(broken: str, tm
     assert f"{broken or 'mypy'} was run" in done.stdout
 
 
+#: A pip that installs a compiler, which exits with the status in the file `status`.
+_PIP = """#!/bin/sh
+for word in "$@"; do
+    [ "$before" != --target ] || target=$word
+    before=$word
+done
+mkdir -p "$target/nvidia/cu13/bin" "$target/nvidia/cu13/lib"
+printf '#!/bin/sh\\nexit "$(cat status)"\\n' >"$target/nvidia/cu13/bin/nvcc"
+chmod +x "$target/nvidia/cu13/bin/nvcc"
+exit "$(cat pip)"
+"""
+
+
+@pytest.mark.parametrize(("pip", "status"), [(0, 0), (1, 0), (0, 1)])
+def test_cudas_compiler_is_installed_only_if_it_compiles(pip: int, status: int, tmp_path: Path) -> None:
+    for name in ("scripts", ".venv/bin"):
+        (tmp_path / name).mkdir(parents=True)
+    shutil.copy(ROOT / "scripts/environment.sh", tmp_path / "scripts")
+    (tmp_path / ".venv/bin/pip").write_text(_PIP, encoding="utf-8")
+    (tmp_path / ".venv/bin/pip").chmod(0o755)
+    (tmp_path / "pip").write_text(str(pip), encoding="utf-8")
+    (tmp_path / "status").write_text(str(status), encoding="utf-8")
+    command = ["sh", "-c", ". scripts/environment.sh; install_nvcc", "scripts/setup"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == int(pip or status), done.stderr
+    left = {path.name for path in (tmp_path / ".venv").iterdir()}
+    assert left == ({"bin"} if pip or status else {"bin", "nvcc"})
+    assert (tmp_path / ".venv/nvcc/lib64").exists() == (not pip and not status)
+
+
+@pytest.mark.parametrize("installs", [True, False])
+@pytest.mark.parametrize("ci", ["true", ""])
+def test_the_long_tests_run_also_if_cudas_compiler_does_not_install(
+    ci: str, installs: bool, tmp_path: Path
+) -> None:
+    shutil.copy(ROOT / "scripts/test_long.sh", tmp_path)
+    functions = f"install_nvcc() {{ echo nvcc; return {int(not installs)}; }}"
+    (tmp_path / "environment.sh").write_text(f"make_environment() {{ :; }}\n{functions}\n", encoding="utf-8")
+    for name in ("urdfkin", "pytest"):
+        (tmp_path / name).write_text(f"#!/bin/sh\necho {name}\n", encoding="utf-8")
+        (tmp_path / name).chmod(0o755)
+    environment = {"PATH": f"{tmp_path}:/usr/bin:/bin", "CI": ci}
+    done = subprocess.run(
+        [tmp_path / "test_long.sh"], env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == [*(["nvcc"] if ci else []), "urdfkin", "pytest"]
+    assert ("CUDA's compiler was not installed" in done.stderr) == bool(ci and not installs)
+
+
 def test_every_hook_runs_a_command_of_the_environment_and_needs_no_network() -> None:
     commands = re.findall(r"entry: \.venv/bin/(\S+)", HOOKS)
     assert {"ruff", "mypy", "urdfkin"} == set(commands)

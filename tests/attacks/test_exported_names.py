@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import warnings
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
-from tests.export.writing import code, file
+from tests.export.writing import code, file, need
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.naming import all_safe, safe, shown, title
 from urdfkin.robot import Robot
@@ -77,7 +78,8 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
     assert set(kinds) - ({ast.ClassDef} if classes else set()) <= allowed
     assert kinds.count(ast.Expr) == 1, "the docstring"
     checked = ["_demand", "_stacked"]
-    helpers = {"numpy": ["_demand"], "array": ["_namespace", *checked], "jax": checked, "torch": checked}
+    helpers = {"numpy": ["_demand"], "casadi": ["_demand"], "array": ["_namespace", *checked]}
+    helpers |= {"jax": checked, "torch": checked}
     assert [node.name for node in module.body if isinstance(node, ast.FunctionDef)] == [
         *helpers.get(to, []),
         "placement",
@@ -85,6 +87,15 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
         "_values",
         "check",
     ]
+
+
+@pytest.mark.parametrize("to", ["numpy", "array", "torch", "sympy-exact"])
+def test_the_check_of_a_file_passes_under_any_names(robot: Robot, to: str) -> None:
+    need(to)
+    scope: dict[str, Any] = {"__name__": "checked"}
+    exec(write(code(robot, quantities=("placement",)), to), scope)
+    assert max(scope["check"]().values()) <= 1.0
+    assert "hacked" not in scope
 
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
@@ -101,6 +112,11 @@ def test_cudas_header_declares_no_more_than_its_functions(robot: Robot, tmp_path
     )
     plain = {line.split()[-1] for line in symbols.stdout.splitlines() if " T " in line}
     assert plain == {f"{written.name}_placement_{real}" for real in ("double", "float")}
+    program = tmp_path / "check"
+    main = [f"-D{written.name.upper()}_MAIN", f"-I{shim}", "-x", "c++", str(path), "-o", str(program)]
+    subprocess.run(["g++", *strict, *main], check=True)
+    said = subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
+    assert said.startswith("good placement: 4 test vectors")
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")

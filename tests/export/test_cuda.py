@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,14 +18,26 @@ from scripts import benchmark_gpu
 from tests.export.writing import ALL, code, file
 from tests.laws.subjects import robot_of
 from urdfkin.export import check as checking
+from urdfkin.export import write
 from urdfkin.export.check import check
 
 #: The folder with a `cuda_runtime.h` for the processor.
 _SHIM = Path(__file__).parent
-_NVCC = pytest.mark.skipif(shutil.which("nvcc") is None, reason="no nvcc")
+_COMPILER = benchmark_gpu.nvcc()
+_NVCC = pytest.mark.skipif(
+    _COMPILER is None, reason="no nvcc; `make nvcc` installs it from the package registry"
+)
 
 
-def ran(path: Path, *options: str) -> str:
+@pytest.fixture
+def nvcc(monkeypatch: pytest.MonkeyPatch) -> str:
+    """CUDA's compiler, which is on the PATH during a test."""
+    assert _COMPILER is not None
+    monkeypatch.setenv("PATH", f"{Path(_COMPILER).parent}{os.pathsep}{os.environ['PATH']}")
+    return _COMPILER
+
+
+def ran(path: Path, *options: str, status: int = 0) -> str:
     """What a program says whose kernels run on the processor, with every warning and bad access an error."""
     if shutil.which("g++") is None:
         pytest.skip("no g++")
@@ -33,7 +47,7 @@ def ran(path: Path, *options: str) -> str:
     command = ["g++", *language, *strict, *options, "-x", "c++", str(path), "-o", str(built)]
     subprocess.run(command, check=True)
     done = subprocess.run([str(built)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == status, done.stdout + done.stderr
     return done.stdout
 
 
@@ -69,6 +83,28 @@ def test_so_do_those_of_wide_rows_of_other_joints_and_of_no_joint(
     path = file(code(subject, quantities=quantities), "cuda", tmp_path)
     said = ran(path, "-fsanitize=address,undefined", f"-D{path.stem.upper()}_MAIN")
     assert said.count("good ") == 2 * len(quantities)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("? tile.row[lane][k] : T(0.0)", "? tile.row[0][k] : T(0.0)"),
+        ("tile.row[lane][k] = own[first + k]", "tile.row[lane][k] = own[k]"),
+        ("WIDTH + first + i % piece] = tile", "WIDTH + i % piece] = tile"),
+        ("blockIdx.x) * THREADS + threadIdx.x / WARP * WARP", "blockIdx.x) * THREADS"),
+        ("return cudaLaunchKernel(", "return 1 + cudaLaunchKernel("),
+        ("results);\n        write_rows", "results); results[7] *= T(1.0001);\n        write_rows"),
+    ],
+)
+def test_a_changed_kernel_fails_the_check_on_the_gpu_only(right: str, wrong: str, tmp_path: Path) -> None:
+    path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)
+    text = path.read_text("utf-8")
+    assert text.count(right) == 1
+    path.write_text(text.replace(right, wrong), "utf-8")
+    said = ran(path, f"-D{path.stem.upper()}_MAIN", status=1)
+    assert re.search(r"^good jacobian: ", said, re.MULTILINE)
+    assert re.search(r"^WRONG jacobian on the GPU: ", said, re.MULTILINE)
 
 
 _SIZES = """
@@ -108,12 +144,12 @@ def test_a_batch_of_any_size_has_the_bits_of_single_configurations(blocks: str, 
 @_NVCC
 @pytest.mark.long
 @pytest.mark.parametrize("real", ["double", "float"])
-def test_cudas_compiler_compiles_it_without_a_warning(real: str, tmp_path: Path) -> None:
+def test_cudas_compiler_compiles_it_without_a_warning(nvcc: str, real: str, tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), "cuda", tmp_path)
     name, built = path.stem.upper(), tmp_path / "check"
     macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
     strict = ["-Xcompiler", "-Wall,-Wextra,-Werror", "-Werror", "all-warnings"]
-    subprocess.run(["nvcc", *strict, *macros, "-x", "cu", str(path), "-o", str(built)], check=True)
+    subprocess.run([nvcc, *strict, *macros, "-x", "cu", str(path), "-o", str(built)], check=True)
     said = subprocess.run([str(built)], capture_output=True, text=True, check=True).stdout
     assert said.count("good ") >= 2  # without a GPU, only the functions of the host
     assert "WRONG" not in said
@@ -151,6 +187,42 @@ def test_the_share_of_the_bandwidth_counts_the_bytes_of_inputs_and_results() -> 
         list(benchmark_gpu.rows(written, [json.dumps(row)]))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [None, "export", "PyTorch Kinematics"])
+def test_the_benchmark_measures_libraries_of_pytorch_after_a_check(
+    wrong: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch: Any = pytest.importorskip("torch")
+    pytest.importorskip("pytorch_kinematics")
+    monkeypatch.setattr(benchmark_gpu, "SIZES", (1, 3))
+    monkeypatch.setattr(benchmark_gpu, "LAUNCHES", 1)
+    monkeypatch.setattr(torch, "compile", lambda function: function)
+    robot = urdfkin.load("planar_two_link")
+    written = code(robot, quantities=("placement", "jacobian"))
+    if wrong == "export":
+        text = write(written, "torch").replace("0.4", "0.41", 1)
+        monkeypatch.setattr(benchmark_gpu, "write", lambda code, to: text)
+    elif wrong:
+        monkeypatch.setattr(benchmark_gpu, "positions", lambda ours, theirs: [1, 0])
+    found = benchmark_gpu.of_torch(robot, "tip", written, "cpu")
+    if wrong:
+        with pytest.raises(ValueError, match=wrong):
+            list(found)
+        return
+    rows = list(benchmark_gpu.rows(written, [json.dumps({"bandwidth": 1e9}), *found]))
+    by = {
+        "placement": ("PyTorch", "torch.compile"),
+        "jacobian": ("PyTorch", "torch.compile", "PyTorch Kinematics"),
+    }
+    assert [(x["quantity"], x["by"], x["real"], x["n"]) for x in rows] == [
+        (name, who, real, n)
+        for name, whos in by.items()
+        for who in whos
+        for real in ("double", "float")
+        for n in (1, 3)
+    ]
+
+
 @pytest.mark.parametrize(
     ("compiler", "said"), [(None, "nvcc is not installed"), ("/bin/false", "CUDA's driver finds no GPU here")]
 )
@@ -172,6 +244,7 @@ def test_cudas_compiler_compiles_the_benchmark(capsys: pytest.CaptureFixture[str
 
 @_NVCC
 @pytest.mark.long
+@pytest.mark.usefixtures("nvcc")
 def test_the_check_takes_cudas_compiler_where_there_is_a_gpu(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -183,6 +256,7 @@ def test_the_check_takes_cudas_compiler_where_there_is_a_gpu(
 
 @_NVCC
 @pytest.mark.long
+@pytest.mark.usefixtures("nvcc")
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
 def test_the_cmake_lines_of_the_file_build_its_library_for_a_program_in_c(tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)

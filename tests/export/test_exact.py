@@ -19,10 +19,12 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import urdfkin as command
 from tests.counted import Counted, Matrix, all_conspiring, deviation, eq
 from tests.export.writing import ALL, code
 from tests.kinematics.test_roundings import PARTS, most, of_sines, theirs, turn
 from tests.laws.subjects import robot_of
+from urdfkin.export import exact as exact_module
 from urdfkin.export import recursion, write
 from urdfkin.export.c import framed
 from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, balls, literal
@@ -112,6 +114,51 @@ def test_the_file_states_the_angles_that_became_multiples_of_pi() -> None:
     assert written.exact is not None
     assert isinstance(written.exact().proof, ExactProof)
     assert "Rational" not in write(written, "sympy")
+
+
+@pytest.mark.slow
+def test_the_command_states_the_proof_of_the_exact_expressions(tmp_path: Path) -> None:
+    path = tmp_path / "arm.py"
+    done = command("export", "panda", "--frame", "panda_hand", "--to", "sympy-exact", "-o", str(path))
+    assert done.code == 0
+    assert (
+        "The expressions were evaluated at 50 digits. Constants are the URDF's decimals; 3 diff" in done.err
+    )
+    exact = re.findall(r"worst disagreement (\S+) eps", path.read_text("utf-8"))
+    assert len(exact) == 3
+    assert re.findall(r"worst disagreement (\S+) eps", done.err) == exact
+    double = command("export", "panda", "--frame", "panda_hand", "--to", "sympy", "-o", str(path)).err
+    assert re.findall(r"worst disagreement (\S+) eps", double) != exact
+    assert "evaluated" not in double
+
+
+@pytest.mark.slow
+def test_the_command_reports_exact_expressions_that_were_not_compared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: Any = exact_module.exact_functions
+
+    def unchecked(*given: Any) -> Any:
+        return made(*given[:-1], False)  # the expressions in double precision were compared
+
+    monkeypatch.setattr(exact_module, "exact_functions", unchecked)
+    words = ("export", "planar_two_link", "--to", "sympy-exact", "-o", str(tmp_path / "arm.py"))
+    done = command(*words)
+    assert done.code == 3
+    assert "NOT VERIFIED" in done.err
+    assert "evaluated" not in done.err
+    assert "UNVERIFIED" in (tmp_path / "arm.py").read_text("utf-8").splitlines()[0]
+
+
+@pytest.mark.slow
+def test_a_difference_between_exact_expressions_and_pinocchio_is_an_error_of_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exact_module, "_evaluated", lambda function, inputs: np.zeros((103, *function.shape)))
+    done = command("export", "planar_two_link", "--to", "sympy-exact", "-o", str(tmp_path / "arm.py"))
+    assert done.code == 1
+    assert "placement" in done.err
+    assert not (tmp_path / "arm.py").exists()
 
 
 def test_a_double_cannot_enter_an_exact_expression() -> None:

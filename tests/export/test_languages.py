@@ -93,14 +93,15 @@ def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_the_end(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "numpy", "array", "sympy-exact"])
-def test_so_does_that_of_planar_and_floating_joints(to: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("to", ["c", "cuda", "numpy", "array", "torch", "sympy-exact"])
+@pytest.mark.parametrize("name", ["planar_and_floating_in_the_middle", "sizes", "mimic_hand_40_sliding"])
+def test_so_does_that_of_other_joints_of_odd_sizes_and_of_a_hand(to: str, name: str, tmp_path: Path) -> None:
     need(to)
     # A Hessian of so many rates takes a compiler half a minute.
-    asked = tuple(name for name in ALL if name != "hessian" or to != "c")
-    found = check(file(code(robot_of("planar_and_floating_in_the_middle"), quantities=asked), to, tmp_path))
+    asked = tuple(row for row in ALL if row != "hessian" or to in ("numpy", "array", "sympy-exact"))
+    found = check(file(code(robot_of(name), quantities=asked), to, tmp_path))
     assert found.good, found.lines
-    assert len(found.lines) == len(asked) * (2 if to in BOTH else 1)
+    assert len(found.lines) == len(asked) * (3 if to == "torch" else 2 if to in BOTH else 1)
 
 
 @pytest.mark.slow
@@ -167,7 +168,7 @@ def test_an_option_that_lets_a_compiler_reorder_sums_is_refused(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("to", ["c", "cpp", "cuda", "numpy", "array", "torch", "sympy-exact"])
+@pytest.mark.parametrize("to", RUN)
 def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None:
     need(to)
     path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), to, tmp_path)
@@ -179,6 +180,29 @@ def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None
     assert not found.good
     assert any(line.startswith("WRONG placement") for line in found.lines)
     assert any(line.startswith("good acceleration") for line in found.lines)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("to", ["numpy", "array", "torch", "sympy-exact"])
+def test_every_constant_of_a_function_is_noticed_if_it_is_changed_by_a_billionth(
+    to: str, tmp_path: Path
+) -> None:
+    need(to)
+    text = file(code(robot_of("panda"), quantities=_THREE), to, tmp_path).read_text("utf-8")
+    functions = [x for x in ast.parse(text).body if isinstance(x, ast.FunctionDef) and x.name in _THREE]
+    lines, changed = text.splitlines(keepends=True), 0
+    for node in (node for function in functions for node in ast.walk(function)):
+        fraction = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Rational"
+        if fraction == (to == "sympy-exact") and (fraction or isinstance(getattr(node, "value", 0), float)):
+            assert isinstance(node, ast.expr)
+            row, first, last = node.lineno - 1, node.col_offset, node.end_col_offset
+            line = lines[row]
+            other = f"({line[first:last]} + 1e-9)"
+            scope: dict[str, Any] = {"__name__": "changed"}
+            exec("".join([*lines[:row], line[:first] + other + line[last:], *lines[row + 1 :]]), scope)
+            assert max(scope["check"]().values()) > 1.0, line
+            changed += 1
+    assert changed > 20
 
 
 @pytest.mark.slow
@@ -277,6 +301,105 @@ def test_numpys_functions_refuse_a_wrong_length_and_convert_whole_numbers(tmp_pa
             own.placement(wrong)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "found"),
+    [
+        ([1j, 0.0], "complex128"),
+        (["1", "2"], "<U1"),
+        ("ab", "<U2"),
+        ([None, 0.0], "object"),
+        ({"q": 1.0}, "object"),
+        (np.array(["2026-11-24"] * 2, dtype="datetime64[D]"), r"datetime64\[D\]"),
+    ],
+)
+def test_numpys_functions_refuse_numbers_that_are_not_real(wrong: Any, found: str, tmp_path: Path) -> None:
+    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numpy", tmp_path))
+    with pytest.raises(TypeError, match=rf"q needs real numbers: found {found}$"):
+        own.velocity(wrong, [0.0, 0.0])
+    with pytest.raises(TypeError, match=rf"v needs real numbers: found {found}$"):
+        own.velocity([0.0, 0.0], wrong)
+
+
+@pytest.mark.parametrize("to", ["numpy", "array"])
+def test_nan_in_an_input_reaches_every_result_that_depends_on_it(to: str, tmp_path: Path) -> None:
+    robot = robot_of("planar_and_floating_in_the_middle")
+    own = module(file(code(robot, quantities=_THREE), to, tmp_path))
+    for name, given in zip(_THREE, (1, 1, 3), strict=True):
+        function, inputs = getattr(own, name), [x[0] for x in state(robot, 1, 4)][:given]
+        right = function(*inputs)
+        for k, i in ((k, i) for k, x in enumerate(inputs) for i in range(len(x))):
+            moved, unknown = ([x.copy() for x in inputs] for _ in range(2))
+            moved[k][i] += 0.3
+            unknown[k][i] = np.nan
+            depends = function(*moved) != right
+            found = function(*unknown)
+            assert np.all(np.isnan(found[depends]))
+            assert np.all((found == right) | np.isnan(found))
+
+
+@pytest.mark.parametrize("installed", [True, False])
+def test_functions_of_any_array_refuse_what_is_no_array(
+    installed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not installed:
+        monkeypatch.setitem(sys.modules, "array_api_compat", None)
+    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "array", tmp_path))
+    right = np.zeros(2)
+    for wrong, found in (([0.0, 0.0], "list"), ("ab", "str"), (None, "NoneType")):
+        with pytest.raises(
+            TypeError, match=rf"q needs an array of an array API .*: found builtins\.{found}\."
+        ):
+            own.velocity(wrong, right)
+        with pytest.raises(TypeError, match=f"v needs an array: found {found}$"):
+            own.velocity(right, wrong)
+
+
+def test_functions_of_casadi_refuse_a_wrong_length(tmp_path: Path) -> None:
+    casadi: Any = pytest.importorskip("casadi")
+    written = file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "casadi", tmp_path)
+    own = module(written)
+    for kind in (casadi.SX, casadi.MX):
+        for right in (kind.sym("q", 2), kind.sym("q", 1, 2), [0.0, kind.sym("q")], np.zeros(2)):
+            assert own.velocity(right, [0.0, 1.0]).shape == (6, 1)
+        for wrong, found in (
+            (kind.sym("q", 3), r"\(3, 1\)"),
+            (kind.sym("q", 2, 2), r"\(2, 2\)"),
+            ([0.0], r"\(1,\)"),
+        ):
+            with pytest.raises(ValueError, match=f"q needs 2 numbers: found the shape {found}"):
+                own.velocity(wrong, [0.0, 1.0])
+            with pytest.raises(ValueError, match=f"v needs 2 numbers: found the shape {found}"):
+                own.velocity([0.0, 1.0], wrong)
+
+
+@pytest.mark.parametrize("to", ["sympy", "sympy-exact"])
+def test_functions_of_sympy_refuse_a_wrong_length(to: str, tmp_path: Path) -> None:
+    sympy: Any = pytest.importorskip("sympy")
+    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), to, tmp_path))
+    right = sympy.symbols("q:2")
+    assert own.velocity(right, sympy.Matrix(right)).shape == (6, 1)
+    for wrong in (sympy.symbols("q:3"), [0]):
+        with pytest.raises(ValueError, match=f"q needs 2 numbers: found {len(wrong)}$"):
+            own.velocity(wrong, right)
+        with pytest.raises(ValueError, match=f"v needs 2 numbers: found {len(wrong)}$"):
+            own.velocity(right, wrong)
+
+
+@pytest.mark.slow
+def test_functions_of_matlab_refuse_a_wrong_length(tmp_path: Path) -> None:
+    need("matlab")
+    path = file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "matlab", tmp_path)
+    calls = ("[0 1 2], [0 1]", "[0 1], 0", "[0; 1], [0 1]")
+    lines = [f"try, disp(size(f.velocity({x}))), catch e, disp(e.message), end" for x in calls]
+    command = ["octave-cli", "--no-init-file", "--eval", f"f = {path.stem}(); {'; '.join(lines)}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
+    assert [line.split() for line in done.stdout.splitlines()] == [
+        ["q", "needs", "2", "numbers:", "found", "3"],
+        ["v", "needs", "2", "numbers:", "found", "1"],
+        ["6", "1"],
+    ]
+
+
 @pytest.mark.slow
 def test_numbas_functions_refuse_a_wrong_length(tmp_path: Path) -> None:
     written = file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numba", tmp_path)
@@ -310,9 +433,9 @@ def _torch(gradcheck: Callable[..., bool]) -> ModuleType:
     """The functions of PyTorch that exported code calls, computed by NumPy."""
     made = ModuleType("torch")
     found = {name: getattr(np, name) for name in ("cos", "sin", "zeros_like", "broadcast_to", "reshape")}
-    found |= {"stack": lambda x, dim: np.stack(x, axis=dim), "float64": np.float64}
+    found |= {"stack": lambda x, dim: np.stack(x, axis=dim), "float64": np.float64, "int64": np.int64}
     found |= {"nn": SimpleNamespace(Module=object), "autograd": SimpleNamespace(gradcheck=gradcheck)}
-    found["tensor"] = lambda x, dtype, **_: np.array(x, dtype=dtype).view(_Tensor)
+    found |= {"Tensor": _Tensor, "tensor": lambda x, dtype, **_: np.array(x, dtype=dtype).view(_Tensor)}
     made.__dict__.update(found)
     return made
 
@@ -388,6 +511,28 @@ def test_gradients_through_any_array_are_the_hessian_within_its_bound(tmp_path: 
     for slopes in (jax.jacfwd, jax.jacrev):
         found = np.asarray(jax.vmap(slopes(own.jacobian))(q))
         assert np.all(np.abs(found - right) <= within)
+
+
+def test_functions_of_pytorch_refuse_what_is_no_tensor_of_floating_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    try:
+        torch: Any = importlib.import_module("torch")
+    except ModuleNotFoundError:
+        monkeypatch.setitem(sys.modules, "torch", torch := _torch(lambda *_, **__: True))
+    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "torch", tmp_path))
+    right = torch.tensor([0.0, 1.0], dtype=torch.float64)
+    assert own.velocity(right, right).shape == (6,)
+    for wrong, error, found in (
+        ([0.0, 1.0], TypeError, "needs a tensor: found list"),
+        (np.zeros(2), TypeError, "needs a tensor: found ndarray"),
+        (torch.tensor([0, 1], dtype=torch.int64), TypeError, r"needs a floating type: found .*int64"),
+        (right[:1], ValueError, r"needs 2 numbers on its last axis: found the shape \(1,\)"),
+    ):
+        with pytest.raises(error, match=f"q {found}"):
+            own.velocity(wrong, right)
+        with pytest.raises(error, match=f"v {found}"):
+            own.velocity(right, wrong)
 
 
 @pytest.mark.slow

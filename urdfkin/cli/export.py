@@ -90,21 +90,24 @@ def command(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
         context.exit(_check(file))
-    from urdfkin.export import write  # noqa: PLC0415  keeps --help fast
+    from urdfkin.export import code_in, write  # noqa: PLC0415  keeps --help fast
     from urdfkin.export.forms import code_of_robot  # noqa: PLC0415
 
     assert robot is not None
     loaded = load_robot(robot, verify=verify)
     wanted = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
     frame = frame or loaded.tip_frame
-    code = code_of_robot(loaded, frame, wanted, reference, form, name=name, verify=verify)
+    code = code_in(code_of_robot(loaded, frame, wanted, reference, form, name=name, verify=verify), to)
     text = write(code, to)
     if output is None or output == Path("-"):
         say_file(text)
     else:
         write_file(output, text.encode())
-    say(check_line(code.proof.certificate), err=True)
-    context.exit(exit_code(code.proof.certificate))
+    proof = code.proof
+    say(check_line(proof.certificate), err=True)
+    if proof.constants and proof.certificate.verified:
+        say(f"The expressions were evaluated {proof.evaluated}. {proof.constants}", err=True)
+    context.exit(exit_code(proof.certificate))
 
 
 def _check(file: Path) -> int:

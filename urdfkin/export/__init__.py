@@ -33,12 +33,22 @@ FORMS = {"tree": "the URDF's links", "dh": "its Denavit-Hartenberg table", "scre
 QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
+def code_in(code: Code, to: str) -> Code:
+    """Return the code with the constants and the proof of the language `to`: exact ones for sympy-exact.
+
+    Raises:
+        VerificationError: Pinocchio computes another result than the exact expressions.
+    """
+    return code.exact() if to == "sympy-exact" and code.exact is not None else code
+
+
 def write(code: Code, to: str) -> str:
     """Return the text of a file in the language `to`, with its seal.
 
     Raises:
         UnknownNameError: the language is unknown.
+        VerificationError: as for `code_in`.
     """
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
-    return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code, to)))
+    return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code_in(code, to), to)))

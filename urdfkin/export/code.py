@@ -42,7 +42,8 @@ class Code:
         words: Identifiers for the numbers of each input, by the input's letter, and for the path's joints.
         about: Lines for the header that describe the table or the screws of the chain; empty for a URDF.
         vouched: The proof; None for code that urdfkin compiles for itself.
-        exact: Function that returns the same code with exact constants; None if there is none.
+        exact: Function that returns the same code with exact constants; None if there is none, or if the
+            constants are exact.
     """
 
     name: str
@@ -150,7 +151,7 @@ def code_of(
         functions, vouched = exact_functions(
             verifier, plan_of, frame, reference, code.functions, proof, verify
         )
-        return replace(code, functions=functions, vouched=vouched)
+        return replace(code, functions=functions, vouched=vouched, exact=None)
 
     return replace(code, exact=exact)
 

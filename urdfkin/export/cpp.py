@@ -36,6 +36,7 @@ def _cpp(code: Code) -> str:
         head=comment(head),
         title=name,
         UP=up,
+        start=framed("main.hpp", title=name, UP=up).rstrip(),
         functions="\n".join(line for function in code.functions for line in _function(code, function)),
         main="\n".join([*vectors(code), main(code, "check_one.hpp")]),
     )
@@ -71,6 +72,7 @@ def _cuda(code: Code) -> str:
         head=comment(head),
         title=name,
         UP=up,
+        start=framed("main.hpp", title=name, UP=up).rstrip(),
         declarations="\n".join(f"{line};" for f in code.functions for line in _entries(code, f)),
         functions="\n".join(functions),
         kernels="".join(_kernel(code, function) for function in code.functions),

@@ -190,14 +190,17 @@ class ExactProof(Proof):
     most: float = 0.0
 
     @property
-    def lines(self) -> list[str]:
-        """The proof in words."""
-        found = [line.replace("in double precision", f"at {DIGITS} digits") for line in super().lines]
+    def evaluated(self) -> str:
+        """Precision of the expressions that were compared with the oracle."""
+        return f"at {DIGITS} digits"
+
+    @property
+    def constants(self) -> str:
+        """Description of the constants."""
         change = f", changed by at most {self.most:.1e} rad" if self.angles else ""
-        return [
-            *found,
-            f"Constants are the URDF's decimals; {self.angles} different angles are multiples of pi{change}",
-        ]
+        return (
+            f"Constants are the URDF's decimals; {self.angles} different angles are multiples of pi{change}"
+        )
 
 
 def exact_functions(

@@ -55,6 +55,8 @@ def _function(code: Code, function: Function) -> Iterator[str]:
     yield f"function out = {function.name}({', '.join(function.inputs)})"
     numbers = ", ".join(function.quantity.equations)
     yield f"% {' x '.join(map(str, shape))}, eq. {numbers}; {function.operations} operations."
+    for x, width in code.widths(function).items():
+        yield f"if numel({x}) ~= {width}, error('{x} needs {width} numbers: found %d', numel({x})), end"
     for node in writer.given:
         yield f"{writer.words[node]} = {node.op}({node.of[0] + 1});"
     for head, lines in writer.statements():

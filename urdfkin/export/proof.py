@@ -87,6 +87,16 @@ class Proof:
     lock: tuple[tuple[str, float], ...] = ()
 
     @property
+    def evaluated(self) -> str:
+        """Precision of the expressions that were compared with the oracle."""
+        return "in double precision"
+
+    @property
+    def constants(self) -> str:
+        """Description of exact constants; "" for constants in double precision."""
+        return ""
+
+    @property
     def lines(self) -> list[str]:
         """The proof in words."""
         oracle = quiet(self.certificate.oracle)
@@ -94,7 +104,7 @@ class Proof:
             reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"
             verdict = [f"UNVERIFIED by {oracle}: {reasons}"]
         else:
-            verdict = [f"Verified by {oracle}, the expressions below evaluated in double precision:"] + [
+            verdict = [f"Verified by {oracle}, the expressions below evaluated {self.evaluated}:"] + [
                 f"  {line.quantity}: {line.checked} configurations, worst disagreement {line.worst:.2g}"
                 f" eps*scale, {line.share:.2%} of the bound"
                 for line in self.certificate.lines
@@ -105,6 +115,7 @@ class Proof:
             f"URDF sha256 {self.sha256}",
             *(f"Joint {shown(name)} is locked at {value!r}" for name, value in self.lock),
             f"Written by urdfkin {self.urdfkin}; {len(self.vectors)} test vectors at {DIGITS} digits below",
+            *([self.constants] if self.constants else []),
         ]
 
     @property

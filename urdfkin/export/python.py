@@ -98,7 +98,8 @@ def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer],
 
 def _shapes(writer: Writer) -> list[str]:
     inputs = writer.function.inputs
-    lines = [f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs] + _demands(writer)
+    lines = [f"{x} = np.asarray({x})" for x in inputs] + _demands(writer)
+    lines += [f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs]
     shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
     return [*lines, f"shape = np.broadcast_shapes({shapes})"]
 
@@ -120,11 +121,19 @@ def _demands(writer: Writer, first: str = "") -> list[str]:
     ]
 
 
-def _lengths(writer: Writer) -> list[str]:
-    """Return the lines of code that check the lengths of one configuration's inputs."""
-    lines = list[str]()
-    for x, width in writer.code.widths(writer.function).items():
-        lines += [f"if len({x}) != {width}:", f'    raise ValueError("{x} needs {width} numbers")']
+def _lengths(text: str) -> Callable[[Writer], list[str]]:
+    """Return a function that returns code which checks the lengths of one configuration's inputs.
+
+    Args:
+        text: Format of the argument of ValueError, for an input `x` that needs `width` numbers.
+    """
+
+    def lines(writer: Writer) -> list[str]:
+        made = list[str]()
+        for x, width in writer.code.widths(writer.function).items():
+            made += [f"if len({x}) != {width}:", f"    raise ValueError({text.format(x=x, width=width)})"]
+        return made
+
     return lines
 
 
@@ -152,33 +161,46 @@ def _namespace(x):
     """Return the array API namespace of an array; for PyTorch that of array-api-compat."""
     if hasattr(x, "__array_namespace__"):
         return x.__array_namespace__()
-    from array_api_compat import array_namespace
+    try:
+        from array_api_compat import array_namespace
 
-    return array_namespace(x)
+        return array_namespace(x)
+    except (ImportError, TypeError):
+        found = f"{type(x).__module__}.{type(x).__qualname__}"
+        raise TypeError(
+            f"q needs an array of an array API namespace: found {found}. PyTorch's tensors need the package"
+            " array-api-compat."
+        ) from None
 '''
 
-_LENGTH = '''
+_DEMAND = '''
 def _demand({given}name, x, width):
-    """Raise an error if the last axis of an input has another length than `width`{or_type}."""
+    """Raise an error if an input is not {array} (..., width) of {numbers}."""
+{is_array}    if {wrong}:
+        raise TypeError(f"{{name}} needs {numbers}: found {{x.dtype}}")
     if x.ndim == 0 or x.shape[-1] != width:
         found = tuple(x.shape)
         raise ValueError(f"{{name}} needs {{width}} numbers on its last axis: found the shape {{found}}")
 '''
-_FLOATING = (
-    _LENGTH
-    + """    if not {floating}:
-        raise TypeError(f"{{name}} needs a floating type: found {{x.dtype}}")
+_IS_ARRAY = """    if not {is_array}:
+        raise TypeError(f"{{name}} needs {array}: found {{type(x).__name__}}")
 """
-)
 
 
-def _demand(given: str = "", floating: str = "") -> str:
-    """Return the code of a function that checks the length of an input.
+def _demand(
+    wrong: str, given: str = "", numbers: str = "a floating type", array: str = "an array", is_array: str = ""
+) -> str:
+    """Return the code of a function that checks an input.
 
-    If `floating` is not empty, it is an expression that tests for a floating type, and the code uses it.
+    Args:
+        wrong: Expression that is true if the numbers have another type.
+        given: Further arguments of the function.
+        numbers: Name of the accepted types.
+        array: Name of the accepted container.
+        is_array: Expression that tests for the container; "" if the input is always one.
     """
-    text, or_type = (_FLOATING, ", or no floating type") if floating else (_LENGTH, "")
-    return text.format(given=given, floating=floating, or_type=or_type)
+    first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
+    return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
 
 
 _STACKED = '''
@@ -256,6 +278,14 @@ def _all(code: Code) -> str:
     return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
 
 
+_VECTOR = '''
+def _demand(name, x, width):
+    """Raise an error if an input is not a vector of `width` numbers."""
+    found = tuple(x.shape) if hasattr(x, "shape") else (len(x),)
+    if found not in ((width,), (width, 1), (1, width)):
+        raise ValueError(f"{name} needs {width} numbers: found the shape {found}")
+'''
+_FOUND = 'f"{x} needs {width} numbers: found {{len({x})}}"'
 _FUNCTIONS = ("cos", "sin", "sqrt")
 _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 
@@ -263,7 +293,7 @@ DIALECTS = {
     "numpy": Dialect(
         about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; so do results.",
         imports="import numpy as np\nfrom numpy import {}",
-        helpers=_demand(),
+        helpers=_demand('x.dtype.kind not in "biuf"', numbers="real numbers"),
         entering=_shapes,
         index="{}[..., {}]",
         result=_in_array("np.empty((*shape, {1}))", "..., "),
@@ -276,7 +306,7 @@ DIALECTS = {
         imports="import numpy",
         helpers=_NAMESPACE
         + "\n"
-        + _demand("xp, ", 'xp.isdtype(x.dtype, "real floating")')
+        + _demand('not xp.isdtype(x.dtype, "real floating")', "xp, ", is_array='hasattr(x, "ndim")')
         + "\n"
         + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
         entering=_in_any_namespace,
@@ -296,7 +326,7 @@ DIALECTS = {
         about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
         decorator='@njit(error_model="numpy")',
-        entering=_lengths,
+        entering=_lengths('"{x} needs {width} numbers"'),  # Numba needs a constant text
         result=_in_array("np.empty({0})", ""),
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
@@ -306,7 +336,7 @@ DIALECTS = {
         "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
-        helpers=_demand("", "jnp.issubdtype(x.dtype, jnp.floating)")
+        helpers=_demand("not jnp.issubdtype(x.dtype, jnp.floating)")
         + "\n"
         + _STACKED.format(given="", xp="jnp", axis="axis"),
         entering=lambda writer: [
@@ -330,7 +360,7 @@ DIALECTS = {
         about="Tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device, which broadcast;\n"
         "for autograd, torch.func, vmap and compile. Kinematics() has the functions as a module.",
         imports="import torch\nfrom torch import {}",
-        helpers=_demand("", "x.is_floating_point()")
+        helpers=_demand("not x.is_floating_point()", array="a tensor", is_array="isinstance(x, torch.Tensor)")
         + "\n"
         + _STACKED.format(given="", xp="torch", axis="dim"),
         entering=lambda writer: [*_demands(writer), _zero(writer, "torch")],
@@ -348,6 +378,8 @@ DIALECTS = {
     "casadi": Dialect(
         about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian has {nv} times 6 rows.",
         imports="import casadi\nfrom casadi import {}",
+        helpers=_VECTOR,
+        entering=_demands,
         result=_nested("casadi.vertcat(", ")", "casadi.horzcat({})"),
         values=_ONE_BY_ONE.format(
             "[float(x) for row in casadi.DM(function(*map(casadi.DM, one))).full().tolist() for x in row]"
@@ -357,6 +389,7 @@ DIALECTS = {
         about="Lists of symbols or numbers: q ({nq}), v and a ({nv}). Each result is a Matrix. A Hessian has"
         " {nv} times 6 rows and {nv} columns.",
         imports="import sympy\nfrom sympy import {}",
+        entering=_lengths(_FOUND),
         result=_nested("sympy.Matrix([", "])"),
         values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),
     ),
@@ -365,6 +398,7 @@ DIALECTS = {
         "numbers. A Hessian has {nv} times 6 rows and {nv} columns.\n"
         "For example: placement(sympy.symbols('q:{nq}'))",
         imports="import types\n\nimport mpmath\nfrom sympy import Matrix, Rational, pi\nfrom sympy import {}",
+        entering=_lengths(_FOUND),
         result=_nested("Matrix([", "])"),
         # SymPy simplifies large expressions slowly, so the check runs the same code with mpmath's numbers.
         values='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
@@ -384,8 +418,6 @@ def write(code: Code, to: str) -> str:
     The module also contains a check, which `python FILE` runs.
     """
     dialect = DIALECTS[to]
-    if dialect.exact and code.exact is not None:
-        code = code.exact()
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [
         '"""' + code.head[0],

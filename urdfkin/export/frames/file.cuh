@@ -91,16 +91,7 @@ extern "C" {
 #endif
 
 #ifdef @UP@_MAIN
-#include <cfloat>
-#include <cstdio>
-#ifndef @UP@_REAL
-#define @UP@_REAL double
-#endif
-using namespace @title@_kinematics;
-using std::fabs;
-using std::printf;
-typedef @UP@_REAL real;
-#define R(x) (static_cast<real>(x))
+@start@
 #ifdef __CUDACC__
 #define @UP@_PASTE(name, type) name##_##type
 #define @UP@_CALL(name, type) @UP@_PASTE(name, type)
