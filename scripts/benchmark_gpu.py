@@ -38,7 +38,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
-from scripts.benchmarking.peers import positions
+from scripts.benchmarking.contenders import positions
 from scripts.pages import table as markdown
 from urdfkin.export import QUANTITIES, write
 from urdfkin.export.code import Code
