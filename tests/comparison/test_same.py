@@ -19,8 +19,9 @@ from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
 from urdfkin.comparison.certificate import SAME, certificate, recheck, words_of
 from urdfkin.comparison.result import Verdict
-from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism
-from urdfkin.model.tree import JointKind
+from urdfkin.model.mechanisms.matcher import MechanismMatcher
+from urdfkin.model.mechanisms.mechanism import Alignment, JointTransform, Mechanism
+from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 
@@ -44,6 +45,40 @@ def test_a_robot_is_itself_and_pinocchio_sees_no_distance() -> None:
 def test_it_can_be_taken_for_the_answer() -> None:
     assert urdfkin.same("panda", "panda_collision")
     assert not urdfkin.same("ur5", "ur3", bounds=False)
+
+
+def _tried(
+    monkeypatch: pytest.MonkeyPatch, a: Robot, b: Robot
+) -> list[tuple[MechanismMatcher, tuple[int, int], Alignment]]:
+    """Compare two robots, and return each pair of bodies from which they were aligned."""
+    tried, run = list[tuple[MechanismMatcher, tuple[int, int], Alignment]](), MechanismMatcher._run
+
+    def noted(self: MechanismMatcher, base: tuple[int, int], X: FloatArray) -> Alignment:
+        tried.append((self, base, found := run(self, base, X)))
+        return found
+
+    monkeypatch.setattr(MechanismMatcher, "_run", noted)
+    urdfkin.same(a, b, bounds=False)
+    return tried
+
+
+@pytest.mark.parametrize("what", ["all of it, no name left", "rounded"])
+@pytest.mark.parametrize("name", ["panda", "polar"])
+def test_no_more_joints_and_links_agree_than_the_bodies_at_the_start_allow(
+    monkeypatch: pytest.MonkeyPatch, name: str, what: str
+) -> None:
+    tried = _tried(monkeypatch, robot(name), other(name, what))
+    assert tried
+    assert all(found.matched <= self._most(base) for self, base, found in tried)
+
+
+def test_bodies_from_which_less_can_agree_than_agrees_already_are_not_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    text = robot("panda").urdf
+    near = urdfkin.load(text.replace('"panda_link0"', '"world"').replace("0.316", "0.316001"))
+    starts = {base for _, base, _ in _tried(monkeypatch, urdfkin.load(text), near)}
+    assert starts == {(0, 0), (0, 1), (0, 8), (0, 9)}  # without the bound: all ten bodies of B
 
 
 def test_limits_are_told_apart_from_motion() -> None:

@@ -136,7 +136,7 @@ class Search:
             if joint.nq == 1:
                 q_a[:, at] = values.get(f"a:{joint.name}", 0.0)
         for name, line in self.variables.leaders.items():
-            q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = _value(line, values)
+            q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = line.at(values)
         return q_a, q_b
 
     def belong_together(self, q_a: FloatArray, q_b: FloatArray) -> bool:
@@ -181,7 +181,8 @@ class Search:
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
         """Return distances (n, frames) of matching frame origins (m) at configurations of A and B."""
-        return _distances(*self.poses_at(q_a, q_b, frames, computed))
+        a, b = self.poses_at(q_a, q_b, frames, computed)
+        return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
 
     def random(self, n: int) -> FloatArray:
         """Return random values (n, variables) within their ranges."""
@@ -190,7 +191,7 @@ class Search:
 
     def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """Return the distances (n, frames) between matching frame origins (m); arguments as for `poses`."""
-        return _distances(*self.poses(z, frames))
+        return self.at(*self.configurations(z), frames, own_results)
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
         """Compute the distances (n, frames) at random configurations and at corners of the joint ranges.
@@ -281,10 +282,6 @@ class Search:
         return [i for i, name in enumerate(self.names) if name in names]
 
 
-def _distances(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
-
-
 def own_results(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by urdfkin's forward recursion."""
     return placements(*_flat_inputs(robot, q, frames))
@@ -299,10 +296,6 @@ def _flat_inputs(robot: Robot, q: FloatArray, frames: Sequence[str]) -> tuple[Co
 def pinocchios(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by Pinocchio from the robot's text."""
     return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
-
-
-def _value(line: Line, values: dict[str, FloatArray]) -> FloatArray | float:
-    return line.constant + (line.slope * values.get(line.variable, 0.0) if line.slope else 0.0)
 
 
 _ORIGIN = np.zeros(3)

@@ -152,7 +152,8 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "is carried by other joints in the other model")
             return
-        if self.joints[0].any() and (len(steps) > 1 or self._sums(paths[1][0])):
+        # paths[1][0] is B's path back to the reference link.
+        if self.joints[0].any() and (len(steps) > 1 or self.joints[1][paths[1][0]].any()):
             yield JointDifference(name, "", None, "is carried by joints without a common link between them")
             return
         if any(step is not None and step.kind in ("planar", "floating") for step in steps):
@@ -175,10 +176,6 @@ class JointComparison:
                     self._beyond(joint, "axis", *self._between(step, *seen), sum(bound) + sum(bounds))
                 )
             yield from beyond
-
-    def _sums(self, back: Sequence[int]) -> bool:
-        """Return whether the path of B back to the reference link contains rounded joints."""
-        return bool(back) and bool(self.joints[1][list(back)].any())
 
     def _between(self, step: Step, axis: Screw, other: Screw) -> tuple[float, float]:
         """Return the angle and the distance of two axes.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -595,12 +595,10 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
 
 def parse_map(words: tuple[str, ...]) -> dict[str, str]:
     """Parse words of the form NAME=NAME; raise InputError for a word of another form."""
-    return dict(_pairs(words))
-
-
-def _pairs(words: tuple[str, ...]) -> Iterator[tuple[str, str]]:
+    pairs = dict[str, str]()
     for word in words:
-        ours, equals, theirs = word.partition("=")
-        if not equals or not ours or not theirs:
+        ours, _, theirs = word.partition("=")
+        if not ours or not theirs:
             raise InputError("a pair of joints is JOINT_OF_A=JOINT_OF_B", where="--map", found=repr(word))
-        yield ours, theirs
+        pairs[ours] = theirs
+    return pairs

@@ -126,15 +126,32 @@ class MechanismMatcher:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
+        #: For each body of A and of B: the result of `_counts`.
+        self.counts = _counts(a), _counts(b)
+        #: The number of agreements that the best alignment has so far.
+        self.matched = 0
         #: The search for exact matches of subtrees. It is None if `gauge` prescribes the choices.
         self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
 
-    def beginnings(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
+    def best(self) -> Alignment:
+        """Return the best alignment over all starting bodies; of equally good ones, the first."""
+        best: Alignment | None = None
+        for bodies, X in self._beginnings():
+            found = self._run(bodies, X)
+            if best is None or better((found.matched, found.worst), (best.matched, best.worst)):
+                best, self.matched = found, found.matched
+            if not best.worst and not (best.only_a and best.only_b):
+                break
+        assert best is not None
+        return best
+
+    def _beginnings(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
         """Yield pairs of bodies at which the matcher can begin, with a pose of B's root in A's root frame.
 
-        The most likely pair comes first.
+        The most likely pair comes first. Pairs from which fewer joints and links can agree than in the best
+        alignment so far are left out.
         """
         if self.gauge is not None:
             names = self.gauge.base
@@ -151,11 +168,35 @@ class MechanismMatcher:
             if exact is not None:
                 yield exact
         for base in bases:
+            if self._most(base) < self.matched:
+                continue
             tried = list[FloatArray]()
             for X in self._places(base):
                 if not any(self.tolerance.holds(*apart(known, X)) for known in tried):
                     tried.append(X)
                     yield base, X
+
+    def _most(self, base: tuple[int, int]) -> int:
+        """Return an upper bound on the number of joints and links that agree from two bodies on.
+
+        Each branch at one body is matched with at most one branch at the other body. In two matched branches,
+        no more joints agree than the smaller branch has, and no more links. The sum of these numbers is
+        largest if the branches are matched in the order of their sizes.
+        """
+        most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
+        for k in (0, 1):  # joints, links
+            sizes = (
+                sorted(
+                    (
+                        counts[edge.outer][k] if edge.inner == body else counts[0][k] - counts[edge.outer][k]
+                        for edge in m.edges_of[body]
+                    ),
+                    reverse=True,
+                )
+                for m, body, counts in zip((self.a, self.b), base, self.counts, strict=True)
+            )
+            most += sum(map(min, *sizes))
+        return most
 
     def _mimics(self) -> bool:
         return any(joint.mimic is not None for m in (self.a, self.b) for joint in m.tree.joints)
@@ -233,7 +274,7 @@ class MechanismMatcher:
 
     # -- matching ------------------------------------------------------------------------------------
 
-    def run(self, base: tuple[int, int], X: FloatArray) -> Alignment:
+    def _run(self, base: tuple[int, int], X: FloatArray) -> Alignment:
         """Return the alignment that starts at a pair of bodies, with the pose X of B's root."""
         found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
         stack = [Place(base, (None, None), -1, IDENTITY, X)]
@@ -554,6 +595,18 @@ class MechanismMatcher:
             yield from zeros(u, ours.moved(G), theirs.moved(there.XC), turns)
 
 
+def _counts(mechanism: Mechanism) -> list[tuple[int, int]]:
+    """Return for each body the numbers of joints and of links from the joint before the body to the tips.
+
+    The root body, which no joint carries, is counted like a body with a joint.
+    """
+    found = [(1, len(links)) for links in mechanism.bodies]
+    for edge in reversed(mechanism.edges):  # from the tips to the root
+        joints, links = found[edge.outer]
+        found[edge.inner] = found[edge.inner][0] + joints, found[edge.inner][1] + links
+    return found
+
+
 def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
     """Return the body of `other` that has most link names in common with the root body of `one`.
 
@@ -763,16 +816,8 @@ def _best_alignment(
 ) -> Alignment:
     """Return the best alignment over all starting bodies; if `base` is given, only its bodies are used."""
     tolerance = tolerance or tolerance_of(a, b)
-    walk = MechanismMatcher(a, b, Pairing(a, b, given, tolerance), gauge, ahead or Ahead(0), tolerance, base)
-    best: Alignment | None = None
-    for bodies, X in walk.beginnings():
-        found = walk.run(bodies, X)
-        if best is None or better((found.matched, found.worst), (best.matched, best.worst)):
-            best = found
-        if not best.worst and not (best.only_a and best.only_b):
-            break
-    assert best is not None
-    return best
+    pairing = Pairing(a, b, given, tolerance)
+    return MechanismMatcher(a, b, pairing, gauge, ahead or Ahead(0), tolerance, base).best()
 
 
 #: These numbers of full turns are tried as additions to the zero offset of a mimicked joint.

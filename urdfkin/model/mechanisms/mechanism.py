@@ -681,8 +681,8 @@ class Line:
         return Line(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Return the function's value for given values of the variables."""
-        return self.constant + (self.slope * values[self.variable] if self.slope else 0.0)
+        """Return the function's value for given values of the variables; a variable without a value is 0."""
+        return self.constant + (self.slope * values.get(self.variable, 0.0) if self.slope else 0.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -348,14 +348,8 @@ def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Gr
     The difference is largest at the ends of the ranges.
     """
     if (name := pair.variable) is not None:
-        ends = [(z, z) for z in variables.ranges.get(name, (0.0, 0.0))]
-        values = [
-            tuple(
-                line.constant + (line.slope and line.slope * z)
-                for line, z in zip((pair.a, pair.b), zz, strict=True)
-            )
-            for zz in ends
-        ]
+        ends = variables.ranges.get(name, (0.0, 0.0))
+        values = [(pair.a.at({name: z}), pair.b.at({name: z})) for z in ends]
     else:
         values = [(t, other) for t in variables.range(pair.a) for other in variables.range(pair.b)]
     with np.errstate(invalid="ignore"):
