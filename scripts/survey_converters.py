@@ -173,9 +173,9 @@ def _without_shapes(urdf: str, folder: Path) -> Path:
 def row_of(tool: str, pythons: Mapping[str, str], name: str) -> list[str]:
     """Return the row of a robot: name, joints, verdict, and two sizes.
 
-    For USD that a tool writes for a URDF, `same` gives two distances: the largest distance between the models,
-    and the largest distance that single precision can cause. Otherwise the sizes are the largest distance and
-    the largest angle between the models as they are written.
+    For USD that a tool writes for a URDF, `same` gives two distances: the largest distance between the
+    models, and the largest distance that single precision can cause. Otherwise the sizes are the largest
+    distance and the largest angle between the models as they are written.
     """
     try:
         joints, found = _compared(tool, pythons, name)
