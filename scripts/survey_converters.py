@@ -1,14 +1,18 @@
-"""Convert robots of the catalogue with another tool, and compare the result with the URDF by `urdfkin.same`.
+"""Convert robots of the catalogue with other tools, and compare each result with its source by `same`.
 
-To MJCF, MuJoCo compiles the URDF and writes the model:
+    python scripts/survey_converters.py TOOL[=PYTHON]... [--robots NAME...]
 
-    python scripts/survey_converters.py mujoco [ROBOT...]
-
-To USD, Newton's urdf-usd-converter writes a stage. It needs the library usd-exchange, whose modules have the
-names of usd-core's, so it belongs in an environment of its own:
+PYTHON is the interpreter of an environment with the tool; its default is this interpreter. A tool that reads
+MJCF gets what MuJoCo writes for the URDF. A tool that reads USD gets what the tool named in `TOOLS` writes
+for it, so that tool must be given too. usd-core and usd-exchange have modules of the same names, so each tool
+belongs in an environment of its own:
 
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
-    python scripts/survey_converters.py CONVERTER/bin/python [ROBOT...]
+    python scripts/survey_converters.py urdf-usd-converter=CONVERTER/bin/python
+
+With one tool, a row of the table has the verdict and two sizes. With several tools, it has a cell for each,
+with the largest distance of the models as they are written. These bounds are computed without boxes, which
+saves time, so they may be larger. The long verdicts then go to standard error.
 
 Shapes are removed first: a converter would look for meshes. MuJoCo refuses a moving body without mass, so it
 is told to give such a body a small one, and to correct impossible inertias.
@@ -21,81 +25,168 @@ import subprocess
 import sys
 import tempfile
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 import urdfkin
 from scripts.pages import table
+from urdfkin.comparison.bounds import MOST
 from urdfkin.comparison.result import Sameness, Verdict, angle, length
 from urdfkin.urdf.catalogue import catalogue
 
-_TO_USD = """
-import sys
-import urdf_usd_converter
-made = urdf_usd_converter.Converter(layer_structure=False, scene=False).convert(*sys.argv[1:])
+_NEWTON = """import {0}
+made = {0}.Converter(layer_structure=False, scene=False).convert(source, to)
 print(made.path)
 """
-_TO_MJCF = """
-import pathlib, sys
-import mujoco
-spec = mujoco.MjSpec.from_file(sys.argv[1])
+_COMPILED = """
+spec = mujoco.MjSpec.from_file(source)
 spec.compile()
-path = pathlib.Path(sys.argv[2]).with_suffix(".xml")
-path.write_text(spec.to_xml())
-print(path)
+pathlib.Path(to + ".xml").write_text(spec.to_xml())
 """
-#: Longest quotation of the converter's message, in characters.
+
+
+class Tool(NamedTuple):
+    """A converter: the tool that writes its source (empty for the URDF), and its program."""
+
+    reads: str
+    program: str
+    writes: str = ""
+
+
+TOOLS = {
+    "mujoco": Tool("", f"import mujoco{_COMPILED}", ".xml"),
+    "urdf2mjcf": Tool(
+        "",
+        "from urdf2mjcf.convert import convert_urdf_to_mjcf\n"
+        "convert_urdf_to_mjcf(source, to + '.xml', copy_meshes=False)",
+        ".xml",
+    ),
+    "urdf-to-mjcf": Tool(
+        "",
+        "sys.argv = ['urdf-to-mjcf', source, '-o', to + '/robot.xml']\n"
+        "from urdf_to_mjcf.cli.convert import main\nmain()",
+        "/robot.xml",
+    ),
+    "urdf-usd-converter": Tool("", _NEWTON.format("urdf_usd_converter")),
+    "mujoco-usd-converter": Tool("mujoco", _NEWTON.format("mujoco_usd_converter")),
+    "mujoco-usd": Tool(
+        "mujoco",
+        "import mujoco.usd\nfrom pxr import Sdf\nSdf.Layer.FindOrOpen(source).Export(to + '.usda')",
+        ".usda",
+    ),
+    "mujoco-usd-back": Tool(
+        "mujoco-usd-converter",
+        f"import mujoco, mujoco.usd\nfrom mujoco.usd import MjcPhysics{_COMPILED}",
+        ".xml",
+    ),
+    "mjcf-urdf-simple-converter": Tool(
+        "mujoco",
+        "from mjcf_urdf_simple_converter import convert\nconvert(source, to + '.urdf')",
+        ".urdf",
+    ),
+    "nvidia-srl-usd-to-urdf": Tool(
+        "urdf-usd-converter",
+        "from nvidia.srl.from_usd.to_urdf import UsdToUrdf\n"
+        "UsdToUrdf.init_from_file(source).save_to_file(to + '.urdf')",
+        ".urdf",
+    ),
+}
+#: Short words for a verdict, by its beginning; the first that fits.
+_SHORT = {
+    "same up to": "single precision",
+    "same": "same",
+    "equivalent": "equivalent",
+    "not compared": "not readable",
+}
+#: Longest quotation of a converter's message, in characters.
 _QUOTED = 120
 #: Settings with which MuJoCo accepts bodies without mass, or with an impossible inertia.
 _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true"}
 
 
-def converted(tool: str, urdf: str, folder: Path) -> Path | str:
-    """Return the file that a tool writes for a URDF text, or the tool's message if it refuses the robot."""
-    robot = ElementTree.fromstring(urdf)
-    for link in robot.iterfind("link"):
-        for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:
-            link.remove(shape)
-    script, python = _TO_USD, tool
-    if tool == "mujoco":
-        script, python = _TO_MJCF, sys.executable
-        ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _LENIENT)
-    file = folder / "robot.urdf"
-    file.write_bytes(ElementTree.tostring(robot))
-    words = [python, "-I", "-c", script, str(file), str(folder / "converted")]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300, cwd=folder)
+class RefusalError(Exception):
+    """A converter refuses a robot."""
+
+
+def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
+    """Return the file that a tool reads for a URDF, and the file that it writes.
+
+    Raises:
+        RefusalError: the tool, or the one that writes its source, refuses the robot; with its message.
+    """
+    reads, program, writes = TOOLS[tool]
+    source = converted(reads, pythons, urdf, folder)[1] if reads else urdf
+    to = folder / tool.replace(" ", "-")
+    script = f"import pathlib, sys\nsource, to = sys.argv[1:]\n{program}"
+    words = [pythons.get(tool, sys.executable), "-I", "-c", script, str(source), str(to)]
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300, cwd=folder)
+    except subprocess.TimeoutExpired:
+        raise RefusalError(f"{tool} does not finish within 300 s") from None
     if done.returncode:
-        error = done.stderr.rpartition("Error: ")[2] or "no message"
-        return " ".join(error.split())[:_QUOTED]
-    return Path(done.stdout.strip().splitlines()[-1])
+        lines = [line for line in done.stderr.splitlines() if "Error: " in line] or ["no message"]
+        error = " ".join(done.stderr[done.stderr.rindex(lines[-1]) :].split()).partition("Error: ")[2]
+        raise RefusalError(f"{'the converter' if len(pythons) == 1 else tool} refuses it: {error[:_QUOTED]}")
+    return source, Path(f"{to}{writes}" if writes else done.stdout.strip().splitlines()[-1])
 
 
-def row_of(tool: str, name: str) -> tuple[str, str, str, str, str]:
-    """Return the row of a robot: name, joints, verdict, and two sizes.
+def _compared(tool: str, pythons: Mapping[str, str], name: str) -> tuple[str, Sameness]:
+    """Return the number of moving joints of a robot, and the comparison of a tool's source and result.
 
-    For MJCF the sizes are the largest distance and the largest angle between the models as they are written.
-    For USD, `same` gives two distances: the largest distance between the models, and the largest distance
-    that single precision can cause.
+    Raises:
+        RefusalError: the robot is not converted, or not compared; the message has the reason.
     """
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         robot = urdfkin.load(name)
-        joints = str(sum(joint.kind.nq > 0 for joint in robot.tree.joints))
-        file = converted(tool, robot.urdf, Path(folder))
-        if isinstance(file, str):
-            return name, joints, f"the converter refuses it: {file}", "", ""
         try:
-            found = urdfkin.same(robot, _loaded(file))
+            files = converted(tool, pythons, _without_shapes(robot.urdf, Path(folder)), Path(folder))
+            source = _loaded(files[0]) if TOOLS[tool].reads else robot
+            boxes = 0 if len(pythons) > 1 else MOST
+            return _joints(robot), urdfkin.same(source, _loaded(files[1]), boxes=boxes)
         except urdfkin.UrdfkinError as error:
-            return name, joints, f"not compared: {error.what}", "", ""
-    if tool == "mujoco":
-        return name, joints, _verdict(found), length(found.written[0]), angle(found.written[1])
+            raise RefusalError(_joints(robot), f"not compared: {error.what}") from None
+        except RefusalError as refusal:
+            raise RefusalError(_joints(robot), *refusal.args) from None
+
+
+def _joints(robot: urdfkin.Robot) -> str:
+    return str(sum(joint.kind.nq > 0 for joint in robot.tree.joints))
+
+
+def _without_shapes(urdf: str, folder: Path) -> Path:
+    """Write a URDF without shapes, and with MuJoCo's lenient settings, which other tools ignore."""
+    robot = ElementTree.fromstring(urdf)
+    for link in robot.iterfind("link"):
+        for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:
+            link.remove(shape)
+    ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _LENIENT)
+    file = folder / "robot.urdf"
+    file.write_bytes(ElementTree.tostring(robot))
+    return file
+
+
+def row_of(tool: str, pythons: Mapping[str, str], name: str) -> list[str]:
+    """Return the row of a robot: name, joints, verdict, and two sizes.
+
+    For USD that a tool writes for a URDF, `same` gives two distances: the largest distance between the
+    models, and the largest distance that single precision can cause. Otherwise the sizes are the largest
+    distance and the largest angle between the models as they are written.
+    """
+    try:
+        joints, found = _compared(tool, pythons, name)
+    except RefusalError as refusal:
+        return [name, *refusal.args, "", ""]
+    if tool != "urdf-usd-converter":
+        return [name, joints, _verdict(found), length(found.written[0]), angle(found.written[1])]
     off = length(0.0 if found.worst is None else found.worst.upper)
     if found.single is None:
-        return name, joints, "the stage has no rounded number", off, ""
-    return name, joints, _verdict(found), off, length(found.single[0])
+        return [name, joints, "the stage has no rounded number", off, ""]
+    return [name, joints, _verdict(found), off, length(found.single[0])]
 
 
 def _verdict(found: Sameness) -> str:
@@ -103,6 +194,17 @@ def _verdict(found: Sameness) -> str:
         after = found.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(found.up_to)}" if after else found.verdict.value
     return str(found.unexplained[0]) if found.unexplained else found.differences[0].words
+
+
+def wide_row(tools: Mapping[str, str], name: str) -> list[str]:
+    """Return the row of a robot: name, joints, and a cell for each tool; write long verdicts to stderr."""
+    row = [name, ""]
+    for tool in tools:
+        _, row[1], verdict, far, _ = row_of(tool, tools, name)
+        print(f"{name}, {tool}: {verdict} {far}", file=sys.stderr, flush=True)
+        short = [word for start, word in _SHORT.items() if verdict.startswith(start)]
+        row.append(" ".join(filter(None, [*short[:1], "" if short or far else "refused", far])))
+    return row
 
 
 def _loaded(file: Path) -> urdfkin.Robot:
@@ -115,20 +217,22 @@ def _loaded(file: Path) -> urdfkin.Robot:
     except urdfkin.UrdfkinError as error:
         if "articulations" not in error.what:
             raise
-    return urdfkin.load(file, articulation=f"/{file.stem}")
+    return urdfkin.load(file, articulation="/")
 
 
 def main() -> None:
     """Print the table in Markdown."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("tool", help="mujoco, or the interpreter of the environment with urdf-usd-converter")
-    parser.add_argument("robots", nargs="*", help="names of the catalogue (default: all)")
+    parser.add_argument("tools", nargs="+", metavar="TOOL[=PYTHON]", help=f"one of {', '.join(TOOLS)}")
+    parser.add_argument("--robots", nargs="+", default=list(catalogue()), help="default: the whole catalogue")
     given = parser.parse_args()
-    last = "angle" if given.tool == "mujoco" else "single precision allows"
-    heads = ("robot", "moving joints", "verdict", "at most apart", last)
-    print(table(heads, []))
-    for name in given.robots or list(catalogue()):
-        print(f"| {' | '.join(row_of(given.tool, name))} |", flush=True)
+    tools = {name: python or sys.executable for name, _, python in (t.partition("=") for t in given.tools)}
+    [tool, *more] = tools
+    last = "single precision allows" if tool == "urdf-usd-converter" else "angle"
+    print(table(["robot", "moving joints", *(tools if more else ("verdict", "at most apart", last))], []))
+    for name in given.robots:
+        row = wide_row(tools, name) if more else row_of(tool, tools, name)
+        print(f"| {' | '.join(row)} |", flush=True)
 
 
 if __name__ == "__main__":

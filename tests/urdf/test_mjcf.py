@@ -183,15 +183,15 @@ def test_a_file_with_everything_is_verified_and_says_what_it_does_not_hold(tmp_p
     assert {w.filename for w in caught} == {__file__}
     assert (robot.nq, robot.nv) == (11, 10)
     assert {"world", "base", "imu", "tool"} <= set(robot.link_names)
-    said = {f.message for f in robot.findings if f.code == "MJCF101"}
+    said = {f.sentence for f in robot.findings if f.code == "MJCF101"}
     assert {
-        "equality curve: a constraint (g and f) that is not linear in one other joint",
-        "equality glue: a constraint (weld of tip and base) that a tree cannot represent",
-        "tendons: tendons have no effect here",
+        "equality 'curve': a constraint (g and f) that is not linear in one other joint",
+        "equality 'glue': a constraint (weld of tip and base) that a tree cannot represent",
+        "tendons have no effect here",
     } <= said
-    noted = " ".join(f.message for f in robot.findings if f.code == "MJCF102")
-    assert "joint root: qpos0 places this body at (0, 0, 1)" in noted
-    assert "joint out: a slide joint without limits" in noted
+    noted = " ".join(f.sentence for f in robot.findings if f.code == "MJCF102")
+    assert "joint 'root': qpos0 places this body at (0, 0, 1)" in noted
+    assert "joint 'out': a slide joint without limits" in noted
     assert "2 actuators, 1 tendons" in noted
     assert "1 geoms" in noted
     robot.placement(robot.sample(3), robot.link_frames)
@@ -379,7 +379,7 @@ def test_a_free_body_that_mujoco_aligns_moves_as_in_mujoco(text: str) -> None:
 def test_a_body_that_cannot_be_aligned_is_listed_and_the_certificate_says_what_was_not_checked() -> None:
     mesh = '<asset><mesh name="m" file="nowhere.stl"/></asset>'
     with pytest.warns(
-        urdfkin.UrdfWarning, match=r"MJCF101.*drone: MuJoCo aligns the frame of this free body"
+        urdfkin.UrdfWarning, match=r"MJCF101.*'drone': MuJoCo aligns the frame of this free body"
     ):
         robot = urdfkin.load(free_body('alignfree="true"', inside='<geom type="mesh" mesh="m"/>', more=mesh))
     robot.placement(robot.neutral(), "camera")
@@ -614,3 +614,57 @@ def test_the_digest_is_that_of_the_file_beside_which_it_stands(tmp_path: Path) -
     shown = json.loads(command("info", str(path), "--format", "json").text)
     assert (shown["sha256"], shown["source"]) == (digest, str(path))
     assert loaded(TWO).sha256 == digest
+
+
+PLACES = """<mujoco>
+  <!-- <equality><weld name="glue" body1="one" body2="two"/></equality> -->
+  <default><equality solref="0.02 1"/><joint damping="1"/></default>
+  <worldbody>
+    <body name="b"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="a" axis="0 0 1"/></body>
+    <body name="two"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <joint type="slide" name="b &amp; c"/></body>
+  </worldbody>
+  <sensor><jointpos name="b &amp; c" joint="a"/></sensor>
+  <equality>
+    <joint joint1="b &amp; c" joint2="a"/>
+    <weld body1="b"
+          body2="two"/>
+    <weld name="glue" body1="b" body2="two"/>
+  </equality>
+</mujoco>
+"""
+
+
+def test_a_finding_has_the_element_and_the_line_of_its_part_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "places.xml"
+    path.write_text(PLACES)
+    done = command("check", "--format", "json", str(path))
+    found = {(one["element"], one["name"]): one for one in done.data["findings"]}
+    lines = PLACES.splitlines()
+    for key, start in {
+        ("joint", "b & c"): '<joint type="slide" name="b &amp; c"',
+        ("equality", "1"): "<weld",
+        ("equality", "glue"): '<weld name="glue"',
+    }.items():
+        one = found.pop(key)
+        line, column = lines[one["line"] - 1], one["column"] - 1
+        assert line[column : column + one["width"]] == start, key
+    assert [(one["element"], one["width"]) for one in found.values()] == [(None, 0)]  # inertias, sensors
+    assert "14 |     <weld name=" in command("check", str(path)).text
+    assert (
+        "line=14,col=5,endColumn=22,title=MJCF101" in command("check", "--format", "github", str(path)).text
+    )
+    run = json.loads(command("check", "--format", "sarif", str(path)).text)["runs"][0]
+    places = [
+        one["logicalLocations"][0] for [one] in (r["locations"] for r in run["results"]) if len(one) > 1
+    ]
+    assert {"name": "glue", "kind": "equality"} in places
+
+
+def test_a_part_of_an_included_file_has_no_line(tmp_path: Path) -> None:
+    (tmp_path / "part.xml").write_text('<mujoco><equality><weld body1="b" body2="two"/></equality></mujoco>')
+    path = tmp_path / "top.xml"
+    path.write_text(PLACES.replace("  <sensor>", '  <include file="part.xml"/><sensor>'))
+    done = command("check", "--format", "json", str(path))
+    lines = {one["name"]: one["line"] for one in done.data["findings"] if one["element"] == "equality"}
+    assert lines == {"0": 1, "2": 1, "glue": 14}  # the numbers of the others depend on the order of the files

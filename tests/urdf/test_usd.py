@@ -5,11 +5,16 @@ import json
 import math
 import os
 import re
+import subprocess
+import sys
+import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -22,6 +27,7 @@ from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Question
 from urdfkin.errors import InputError, OracleError, SourceError
 from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
+from urdfkin.kinematics.roundings import SINGLE
 from urdfkin.model.conventions.convention import transcoded
 from urdfkin.model.tree import LARGEST_ANGLE, Joint, KinematicTree, pose
 from urdfkin.report.diff import as_data, headline
@@ -285,6 +291,78 @@ def test_value_clips_are_refused_before_they_name_a_file(write: Write, tmp_path:
     with pytest.raises(urdfkin.UrdfkinError, match="value clips") as caught:
         loaded(path)
     assert "TOPSECRET" not in str(caught.value)
+
+
+def test_the_root_of_the_articulation_may_be_the_joint_to_the_world(write: Write) -> None:
+    """Isaac Sim's importers apply PhysicsArticulationRootAPI to this joint."""
+    mount = joint("root_joint", "Fixed", "", "base", schemas='"PhysicsArticulationRootAPI"')
+    robot = loaded(write(stage(LINKS.replace(ROOT, "") + JOINTS + mount)))
+    assert robot.link_names[0] == "world"
+    robot.placement([0.0, 0.0], "lower")
+    assert "the same 3 joints" in str(robot.certificate().reading)
+
+
+@pytest.mark.parametrize(
+    ("relationship", "schema"),
+    [
+        ("physxMimicJoint:rotX:referenceJoint", "PhysxMimicJointAPI:rotX"),
+        ("newton:mimicJoint", "NewtonMimicAPI"),
+    ],
+)
+def test_the_rule_of_a_mimic_schema_that_is_not_applied_is_listed(
+    read: Read, relationship: str, schema: str
+) -> None:
+    text = with_schemas('"PhysicsDriveAPI:linear"', f"rel {relationship} = </arm/joints/shoulder>")
+    robot = read(text)
+    what = f"{relationship} has no effect, because {schema} is not applied"
+    assert findings(robot) == [("USD203", "/arm/rail", what)]
+    assert robot.nq == 2
+
+
+def test_the_direction_in_the_name_of_physx_mimic_schema_need_not_be_the_axis_of_the_joint(
+    write: Write,
+) -> None:
+    """Robotiq's and Isaac Sim's grippers have joints about z with PhysxMimicJointAPI:rotX."""
+    follower = joint(
+        "wrist", "Revolute", "upper", "hand",
+        'uniform token physics:axis = "Z"\nrel physxMimicJoint:rotX:referenceJoint = </arm/shoulder>\n'
+        "float physxMimicJoint:rotX:gearing = -1\nfloat physxMimicJoint:rotX:offset = 0\n"
+        "float physxMimicJoint:rotX:naturalFrequency = 5000\nfloat physxMimicJoint:rotX:dampingRatio = 0",
+        '"PhysxMimicJointAPI:rotX", "PhysxJointAPI"',
+    )  # fmt: skip
+    robot = loaded(write(stage(
+        body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + body("hand", "(0, 0, 1)")
+        + JOINTS.partition("def PhysicsPrismatic")[0] + follower
+    )))  # fmt: skip
+    rule = robot.tree.joints[1].mimic
+    assert rule is not None
+    assert (rule.leader, rule.multiplier, rule.offset) == ("shoulder", 1.0, 0.0)
+    assert codes(robot) == {}
+
+
+def test_limits_that_lock_a_joint_are_no_radians(write: Write) -> None:
+    """Robotiq's gripper locks a joint so."""
+    locked_joint = JOINTS.replace("= -90", "= -0.001").replace("= 180", "= 0.001")
+    assert codes(loaded(write(stage(LINKS + locked_joint)))) == {}
+
+
+def test_a_joint_to_a_prim_that_is_only_changed_and_never_defined_is_listed(write: Write) -> None:
+    """The layer that defines the prim can be missing; the layer of the physics only has an `over`."""
+    over = 'over "ghost" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {\n}\n'
+    robot = loaded(write(stage(LINKS + JOINTS + over + joint("j", "Fixed", "ghost", "lower"))))
+    assert codes(robot) == {"USD201": "/arm/j"}
+    assert robot.link_names == ("base", "upper", "lower")
+
+
+def test_two_trees_below_one_articulation_root_are_chosen_by_their_root_bodies(write: Write) -> None:
+    root = 'def Xform "arm" (prepend apiSchemas = ["PhysicsArticulationRootAPI"]) {'
+    text = stage(LINKS.replace(ROOT, "") + JOINTS + body("other") + body("more", "(0, 1, 0)")
+                 + joint("j", "Revolute", "other", "more", _frames((0, 1, 0))))  # fmt: skip
+    path = write(text.replace('def Xform "arm" {', root))
+    with pytest.raises(InputError, match=r"2 articulations.*/arm/base, /arm/other"):
+        loaded(path)
+    assert loaded(path, articulation="/arm/other").link_names == ("other", "more")
+    assert loaded(path, articulation="/arm/base").nq == 2
 
 
 def test_units_and_axes_that_a_stage_does_not_state_are_findings(write: Write) -> None:
@@ -679,6 +757,170 @@ def test_a_missing_layer_is_a_finding(read: Read) -> None:
     assert codes(read(LINKS + JOINTS + 'def "x" (references = @./gone.usda@</a>) { }')) == {"USD103": None}
 
 
+LOOPS = {
+    "subLayers": "#usda 1.0\n(\n    subLayers = [@./{other}.usda@]\n{units})\n{arm}",
+    "references": '#usda 1.0\n(\n{units})\n{arm}def "x" (references = @./{other}.usda@</x>) {{ }}\n',
+    "payload": '#usda 1.0\n(\n{units})\n{arm}def "x" (payload = @./{other}.usda@</x>) {{ }}\n',
+    "inherits": "#usda 1.0\n(\n{units})\n{arm}"
+    'def "x" (inherits = </y>) {{ }}\ndef "y" (inherits = </x>) {{ }}\n',
+}
+
+
+@pytest.mark.parametrize("arc", LOOPS)
+def test_arcs_that_form_a_loop_end_and_are_a_finding(write: Write, arc: str) -> None:
+    units = '    metersPerUnit = 1\n    upAxis = "Z"\n'
+    arm = stage(LINKS + JOINTS).partition(")\n")[2]
+    files = [
+        write(LOOPS[arc].format(other=other, units=units, arm=arm), f"{own}.usda")
+        for own, other in (("a", "b"), ("b", "c"), ("c", "a"))
+    ]
+    for file in files:
+        robot = loaded(file)
+        assert robot.nq == 2
+        assert "USD103" in codes(robot)
+
+
+def test_prims_that_multiply_by_references_end_with_an_error(write: Write) -> None:
+    """Each of 40 prims has two children that refer to the next prim: 2^40 prims."""
+    child = 'def "{}" (references = </p{}>) {{ }}\n'
+    prims = "".join(
+        f'def "p{k}" {{\n{child.format("a", k + 1)}{child.format("b", k + 1)}}}\n' for k in range(40)
+    )
+    path = write(stage(LINKS + JOINTS) + prims)
+    begin = time.monotonic()
+    with pytest.raises(InputError, match=r"cannot read this stage.*(does not|did not finish|memory)"):
+        usd_check.read_usd(path, patience=4.0)
+    assert time.monotonic() - begin < 30.0
+
+
+@pytest.mark.parametrize("arc", ["references", "payload", "subLayers"])
+def test_layers_of_hundreds_of_megabytes_are_refused_before_they_are_read(
+    write: Write, tmp_path: Path, arc: str
+) -> None:
+    text = stage(LINKS + JOINTS + f'def "x" ({arc} = @./large.usdc@</a>) {{ }}')
+    if arc == "subLayers":
+        text = stage(LINKS + JOINTS).replace("(\n", "(\n    subLayers = [@./large.usdc@]\n", 1)
+    path = write(text)
+    with (tmp_path / "large.usdc").open("wb") as file:
+        file.write(b"PXR-USDC")
+        file.truncate(700_000_000)
+    begin = time.monotonic()
+    with pytest.raises(SourceError, match=r"large\.usdc: the file is too large: found 700000000 bytes"):
+        usd.files_of(usd.library(), str(path))
+    with pytest.raises(InputError, match=r"large\.usdc: the file is too large: found 700000000 bytes"):
+        loaded(path)
+    assert time.monotonic() - begin < 30.0
+
+
+def test_many_layers_are_too_large_together(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    filler = "#" + 400 * "x" + "\n"
+    for k in range(5):
+        write(f'#usda 1.0\ndef "a" {{ }}\n{filler}', f"part{k}.usda")
+    refs = "".join(f'def "x{k}" (references = @./part{k}.usda@</a>) {{ }}\n' for k in range(5))
+    path = write(stage(LINKS + JOINTS + refs))
+    own = path.stat().st_size
+    monkeypatch.setattr(usd, "MOST", own + 2000)
+    with pytest.raises(SourceError, match=f"too large: found over {own + 2000} bytes"):
+        usd.files_of(usd.library(), str(path))
+    monkeypatch.setattr(usd, "MOST", own + 5000)
+    assert len(usd.files_of(usd.library(), str(path))) == 6
+
+
+def test_a_stage_of_hundreds_of_layers_is_read_and_one_of_thousands_is_refused(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pxr import Sdf  # noqa: PLC0415
+
+    part = Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
+    for k in range(200):  # the process may have 64 open files
+        part.Export(str(tmp_path / f"part{k}.usdc"))
+    refs = "".join(f'def "x{k}" (references = @./part{k}.usdc@</a>) {{ }}\n' for k in range(200))
+    path = write(stage(LINKS + JOINTS + refs))
+    assert loaded(path).nq == 2
+    monkeypatch.setattr(usd, "_LAYERS", 100)
+    with pytest.raises(InputError, match="too many layers: found over 100"):
+        usd.files_of(usd.library(), str(path))
+
+
+def test_a_texture_or_mesh_that_a_stage_names_is_never_opened(write: Write, tmp_path: Path) -> None:
+    """Reading a pipe without a writer would never end."""
+    os.mkfifo(tmp_path / "pipe.png")
+    shape = (
+        'def Shader "s" {\nasset inputs:file = @./pipe.png@\nasset inputs:other = @/etc/passwd@\n'
+        "asset[] inputs:more = [@./pipe.png@, @https://example.org/a.png@]\n}\n"
+    )
+    assert loaded(write(stage(LINKS + JOINTS + shape))).nq == 2
+
+
+def test_a_crate_or_package_that_is_cut_anywhere_is_an_error_or_the_whole_robot(
+    write: Write, tmp_path: Path
+) -> None:
+    from pxr import Sdf, UsdUtils  # noqa: PLC0415
+
+    path = write(stage(LINKS + JOINTS))
+    crate, package = tmp_path / "robot.usdc", tmp_path / "robot.usdz"
+    Sdf.Layer.FindOrOpen(str(path)).Export(str(crate))
+    UsdUtils.CreateNewUsdzPackage(str(path), str(package))
+    whole = loaded(crate).urdf
+    for file in (crate, package):
+        data = file.read_bytes()
+        for k in range(9):
+            cut = tmp_path / f"cut{k}{file.suffix}"
+            cut.write_bytes(data[: len(data) * k // 9 + 8 * (k == 8)])
+            try:
+                robot = loaded(cut)
+            except (InputError, SourceError):
+                continue
+            assert robot.urdf == whole, (cut, "another robot than the whole file has")
+
+
+DEEDS = {
+    "write": "open(sys.argv[1], 'wb', buffering=0).write(b'x')",
+    "start a process": "import subprocess; subprocess.run(['true'], check=True)",
+    "fork": "os.fork()",
+}
+
+
+@pytest.mark.parametrize("deed", DEEDS)
+def test_even_a_program_in_the_reading_process_cannot_do_this(tmp_path: Path, deed: str) -> None:
+    """A defect of OpenUSD's parsers could run a program after the limits are set, as this one does."""
+    file = tmp_path / "made"
+    words = f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit(5)\n{DEEDS[deed]}"
+    if os.geteuid() == 0 and deed != "write":
+        pytest.skip("the kernel does not limit the processes of root")
+    done = subprocess.run(
+        [sys.executable, "-c", words, str(file)], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode != 0
+    assert not file.exists() or file.stat().st_size == 0
+
+
+def test_a_missing_layer_without_a_dot_before_its_path_is_a_finding_too(write: Write) -> None:
+    """Isaac Sim writes references such as @configuration/arm_base.usd@."""
+    path = write(stage(LINKS + JOINTS + 'def "x" (references = @configuration/gone.usda@</a>) { }'))
+    assert codes(loaded(path)) == {"USD103": None}
+
+
+def test_a_reference_that_openusd_would_find_in_the_current_folder_is_refused(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    (elsewhere / "configuration").mkdir(parents=True)
+    (elsewhere / "configuration" / "arm.usda").write_text(stage(LINKS + JOINTS))
+    path = write(stage('def "x" (references = @configuration/arm.usda@) { }'), "robot/robot.usda")
+    monkeypatch.chdir(elsewhere)
+    with pytest.raises(InputError, match="outside the folder"):
+        loaded(path)
+
+
+def test_a_pointer_of_git_lfs_is_refused_with_its_remedy(write: Write, tmp_path: Path) -> None:
+    pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n"
+    write(pointer, "base.usd")
+    for path in (tmp_path / "base.usd", write(stage(LINKS + 'def "x" (references = @base.usd@) { }'))):
+        with pytest.raises(InputError, match=r"base\.usd: this file is a pointer of Git LFS.*git lfs pull"):
+            loaded(path)
+
+
 @pytest.mark.parametrize("share", [0.01, 0.3, 0.6, 0.9, 0.99])
 def test_a_crate_file_that_is_cut_short_is_an_error(write: Write, share: float) -> None:
     crate = crate_file(write)
@@ -862,6 +1104,31 @@ def test_rounding_to_single_precision_explains_the_difference_from_the_urdf(writ
     assert not found.holds(Question(within=0.0))
 
 
+def test_all_outputs_name_the_verdict_up_to_single_precision_alike(write: Write, tmp_path: Path) -> None:
+    """`same` also finds other tools and zeros, of nanometres; the verdict is about the models as written."""
+    files = {name: tmp_path / name for name in ("map.toml", "a.md", "a.html", "ur5.urdf")}
+    robot = loaded("ur5")
+    files["ur5.urdf"].write_text(robot.urdf)
+    words = ["same", str(files["ur5.urdf"]), str(write(as_usd(robot, transcoded))), "--boxes", "0"]
+    done = command(*words, "--write-map", str(files["map.toml"]), "--markdown", str(files["a.md"]),
+                   "--html", str(files["a.html"]))  # fmt: skip
+    assert done.code == 0, done.text + done.err
+    found = urdfkin.same(robot, loaded(words[2]), boxes=0)
+    assert found.up_to_single
+    assert found.up_to
+    assert "SAME UP TO SINGLE PRECISION" in done.text
+    heading = (
+        f"argest distance over all configurations within limits, after changes of {', '.join(found.up_to)}"
+    )
+    for text in (" ".join(done.text.split()), files["a.md"].read_text(), files["a.html"].read_text()):
+        assert heading in text
+    note = next(line for line in files["map.toml"].read_text().splitlines() if line.startswith("note = "))
+    assert note.endswith(': same up to single precision"')
+    assert str(found.convention().note).endswith(": same up to single precision")
+    assert "same up to single precision>" in repr(found)
+    assert "same up to single precision" in command(*words[:3], words[2], "--boxes", "0").text
+
+
 def test_two_micrometres_are_not_explained_by_single_precision(write: Write) -> None:
     robot = loaded("panda")
     text = as_usd(robot)
@@ -986,6 +1253,19 @@ SLIPS = {
 }
 
 
+def with_mimic(robot: urdfkin.Robot) -> urdfkin.Robot:
+    """Return a robot with a mimic rule: its own, or one between two of its joints."""
+    if any(one.mimic is not None for one in robot.tree.joints):
+        return robot
+    root = ElementTree.fromstring(robot.urdf)
+    moving = [one for one in robot.tree.joints if one.kind.nq == 1]
+    leader, follower = next(two for two in combinations(moving, 2) if two[0].kind.turns == two[1].kind.turns)
+    rule = {"joint": leader.name, "multiplier": "-0.5", "offset": "0.1"}
+    [element] = [one for one in root.iterfind("joint") if one.get("name") == follower.name]
+    ElementTree.SubElement(element, "mimic", rule)
+    return loaded(ElementTree.tostring(root, encoding="unicode"))
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", ROBOTS)
 def test_each_slip_of_a_converter_is_found_and_named(write: Write, name: str) -> None:
@@ -994,15 +1274,15 @@ def test_each_slip_of_a_converter_is_found_and_named(write: Write, name: str) ->
         word = slip_word
         moving = [one for one in robot.tree.joints if one.kind.nq == 1]
         if kind == "mimic dropped":
-            moving = [one for one in moving if one.mimic is not None]
+            robot = with_mimic(robot)
+            moving = [one for one in robot.tree.joints if one.mimic is not None]
         elif kind == "radians":
             moving = [one for one in moving if one.kind.value == "revolute"]
         elif kind == "mirrored frame":
             moving = [one for one in moving if abs(one.T_parent_joint[1, 3]) > 1e-3]
         elif kind in ("centimetres", "exchanged bodies"):
             moving = [one for one in moving if np.linalg.norm(one.T_parent_joint[:3, 3]) > 1e-3]
-        if not moving:
-            continue
+        assert moving, kind
         slipped_stage = loaded(write(as_usd(robot, transcoded, Slip(kind, moving[len(moving) // 2].name))))
         found = urdfkin.same(robot, slipped_stage, boxes=0)
         said = [
@@ -1098,16 +1378,50 @@ def test_check_states_the_place_of_a_finding(write: Write) -> None:
     path = write(stage(IN_RADIANS))
     done = command("check", str(path))
     assert done.code == 0
-    assert "USD303 warning: prim '/arm/shoulder'" in done.text
+    number, line = next(
+        (i, line) for i, line in enumerate(path.read_text().splitlines(), 1) if '"shoulder"' in line
+    )
+    assert f"robot.usda:{number}:1: USD303 warning: prim '/arm/shoulder'" in done.text
+    assert f"{number} | {line}" in done.text
+    [found] = json.loads(command("check", "--format", "json", str(path)).text)["findings"]
+    place = found["element"], found["name"], found["line"], found["column"], found["width"]
+    assert place == ("prim", "/arm/shoulder", number, 1, len('def PhysicsRevoluteJoint "shoulder"'))
+    annotation = command("check", "--format", "github", str(path)).text
+    assert f"robot.usda,line={number},col=1,endColumn=36,title=USD303::prim '/arm/shoulder'" in annotation
     assert command("check", "--strict", str(path)).code == 1
     assert command("check", "--strict", "--ignore", "USD303", str(path)).code == 0
     assert command("check", "--strict", "--select", "USD2", str(path)).code == 0
     run = json.loads(command("check", "--output-format", "sarif", str(path)).text)["runs"][0]
     result = run["results"][0]
     assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == result["ruleId"] == "USD303"
+    [location] = result["locations"]
+    assert location["logicalLocations"] == [{"name": "/arm/shoulder", "kind": "prim"}]
+    assert location["physicalLocation"]["region"] == {"startLine": number, "startColumn": 1, "endColumn": 36}
     done = command("check", str(write(stage(LINKS + SPHERICAL))))
     assert done.code == 2
     assert "spherical" in done.err
+
+
+def test_a_finding_has_the_line_of_its_prim_wherever_the_prim_is_in_the_text(write: Write) -> None:
+    noise = (
+        '# def Xform "stray"\n'
+        'string a = "def Xform \\"stray\\" {"\nstring b = """\ndef Xform "stray" { " \n"""\n'
+        'asset c = @def "stray" {.usda@\nstring[] d = ["}", "{"]\nstring e = \'{\'\n'
+        "matrix4d f = ( (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1) )\n"
+    )
+    data = 'def Scope "notes" (\n customData = {\n string stray = "{"\n dictionary more = {\n}\n}\n) {\n%s}\n'
+    text = stage(LINKS + JOINTS + data % noise + 'def Scope "in" {\n' + body("stray") + "}\n")
+    [finding] = [one for one in loaded(write(text)).findings if one.code == "USD202"]
+    assert finding.name == "/arm/in/stray"
+    lines = text.splitlines()
+    assert lines[finding.line - 1].startswith('def Xform "stray" (prepend')
+    assert (finding.column, finding.width) == (1, len('def Xform "stray"'))
+    assert finding.line > lines.index('def Scope "in" {')
+    other = write(text, "layer.usda")
+    above = write(f"#usda 1.0\n(\n    subLayers = [@./{other.name}@]\n"
+                  '    metersPerUnit = 1\n    upAxis = "Z"\n)\n', "top.usda")  # fmt: skip
+    [finding] = [one for one in loaded(above).findings if one.code == "USD202"]
+    assert (finding.name, finding.line, finding.width) == ("/arm/in/stray", 1, 0)
 
 
 @pytest.mark.parametrize("up", ["Z", "Y"])
@@ -1242,3 +1556,118 @@ def test_a_translation_in_double_precision_is_not_rounded(
         )
     )  # fmt: skip
     assert _explained(urdf, file) == explained
+
+
+@pytest.mark.parametrize("lock", [{"slide": 0.3}, {"elbow": 0.7}, {"slide": -0.2, "wrist": 1.1}])
+def test_locked_joints_are_compared_by_the_rounding_of_their_own_numbers(
+    write: Write, lock: dict[str, float]
+) -> None:
+    text = LONG_SLIDE.replace("1000", "1")
+    robot = urdfkin.load(text, lock=lock)
+    rounded = loaded(write(as_usd(urdfkin.load(text))), lock=lock)
+    for a, b in ((robot, rounded), (rounded, robot)):
+        found = urdfkin.same(a, b, bounds=False)
+        assert found.up_to_single, found.unexplained
+    for name in ("slide", "elbow", "wrist"):
+        slipped_stage = as_usd(urdfkin.load(text), slip=Slip("a micrometre", name))
+        found = urdfkin.same(robot, loaded(write(slipped_stage), lock=lock), bounds=False)
+        assert not found.up_to_single
+        assert found.unexplained
+
+
+def free_base(kind: str, place: Sequence[float]) -> tuple[str, str]:
+    """Write a robot whose base is free, as a URDF and as a stage; `place` is the origin of its free joint."""
+    urdf = _urdf(
+        ("free", kind, "world", "base", f'xyz="{place[0]} {place[1]} {place[2]}"'),
+        ("j", "continuous", "base", "tip", 'xyz="0.1 0.2 0.3"'),
+    )
+    shut = ("transZ", "rotX", "rotY") if kind == "planar" else ()
+    words = [f"float limit:{name}:physics:low = 1\nfloat limit:{name}:physics:high = -1\n" for name in shut]
+    schemas = ", ".join(f'"PhysicsLimitAPI:{name}"' for name in shut)
+    free = joint("free", "", "", "base", _frames(place) + "".join(words), schemas)
+    hinge = joint("j", "Revolute", "base", "tip", _frames((0.1, 0.2, 0.3)))
+    return urdf, stage(body("base", schemas=ROOT) + body("tip") + hinge + free)
+
+
+@pytest.mark.parametrize(("kind", "height"), [("floating", 0.0), ("planar", 0.5)])
+def test_a_free_base_must_have_the_same_frame_and_the_joints_after_it_may_be_rounded(
+    write: Write, kind: str, height: float
+) -> None:
+    urdf, text = free_base(kind, (0.0, 0.0, height))
+    for models in ((loaded(urdf), loaded(write(text))), (loaded(write(text)), loaded(urdf))):
+        found = urdfkin.same(*models, bounds=False)
+        assert found.up_to_single, found.unexplained
+    slipped_hinge = text.replace("(0.1, 0.2, 0.3)", "(0.100001, 0.2, 0.3)")
+    found = urdfkin.same(loaded(urdf), loaded(write(slipped_hinge)), bounds=False)
+    assert [one.place for one in found.unexplained] == ["joint j"]
+    if kind == "planar":  # 0.1 in single precision is 1.5e-9 from 0.1
+        urdf, text = free_base(kind, (0.0, 0.0, 0.1))
+        found = urdfkin.same(loaded(urdf), loaded(write(text)), bounds=False)
+        words = "link base: follows a planar or floating joint with another frame"
+        assert [str(one) for one in found.unexplained] == [words]
+
+
+@pytest.mark.parametrize("name", ["panda", "so101", "allegro_left_hand"])
+def test_two_rounded_stages_of_a_robot_are_the_same_up_to_the_roundings_of_both(
+    write: Write, name: str
+) -> None:
+    """The second stage is written from the first one, with other frames on the axis of a joint."""
+    robot = loaded(name)
+    first = loaded(write(as_usd(robot, transcoded)))
+    moving = [one.name for one in first.tree.joints if one.kind.nq == 1]
+    elsewhere = Slip("other frames on the axis", moving[len(moving) // 2])
+    second = loaded(write(as_usd(first, transcoded, elsewhere), "second.usda"))
+    for a, b in ((first, second), (second, first)):
+        found = urdfkin.same(a, b, bounds=False)
+        assert found.up_to_single, found.unexplained
+        assert found.single is not None
+        alone = [one.single.links.max(axis=0) for one in (first, second) if one.single is not None]
+        assert max(alone[0][0], alone[1][0]) < found.single[0] <= (alone[0][0] + alone[1][0]) * 1.0001
+    slip = Slip("a micrometre", elsewhere.joint)
+    third = loaded(write(as_usd(first, transcoded, slip), "third.usda"))
+    for a, b in ((first, third), (third, first)):
+        found = urdfkin.same(a, b, bounds=False)
+        assert [one.place for one in found.unexplained] == [f"joint {slip.joint}"]
+
+
+def _angle_between(T: Any, U: Any) -> float:
+    return float(np.linalg.norm((T - U)[:3, :3])) / math.sqrt(2.0)  # 2 sin(angle / 2), of a small angle
+
+
+def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_precision() -> None:
+    """UsdGeom composes each transform twice, from numbers in double and from the same in single precision."""
+    pxr, rng = usd.library(), np.random.default_rng(3)
+    made, gf = pxr.Usd.Stage.CreateInMemory(), pxr.Gf
+    reader = usd._Reader(pxr, made, "", frozenset())
+    reader._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
+
+    def placed(op: str, value: Any, precision: str, k: int) -> Any:
+        prim = pxr.UsdGeom.Xform.Define(made, f"/{op}{k}{precision}")
+        how = [] if op == "Transform" else [getattr(pxr.UsdGeom.XformOp, f"Precision{precision}")]
+        getattr(prim, f"Add{op}Op")(*how).Set(value)
+        return reader._placed(prim.GetPrim())[0]
+
+    orders = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+    worst = dict.fromkeys(("Rotate", "Orient", "Transform"), 0.0)
+    for k in range(400):
+        degrees = (
+            rng.uniform(-360.0, 360.0, 3) if k % 2 else rng.choice([-1.0, 1.0], 3) * (360 - rng.random(3))
+        )
+        xyzw = rng.normal(size=4)
+        xyzw /= np.linalg.norm(xyzw)
+        w, v = float(xyzw[3]), xyzw[:3].tolist()
+        matrix = pose(rotation_of(xyzw)).T
+        for op, exact, rounded in (
+            (f"Rotate{orders[k % 6]}", gf.Vec3d(*degrees), gf.Vec3f(*degrees)),
+            (f"Rotate{'XYZ'[k % 3]}", float(degrees[0]), float(np.float32(degrees[0]))),
+            ("Orient", gf.Quatd(w, *v), gf.Quatf(w, *v)),
+            ("Transform", gf.Matrix4d(matrix), gf.Matrix4d(matrix.astype(np.float32).astype(np.float64))),
+        ):
+            angle = _angle_between(placed(op, exact, "Double", k), placed(op, rounded, "Float", k))
+            kind = op.rstrip("XYZ")
+            worst[kind] = max(worst[kind], angle / SINGLE)
+    # an angle above 256 degrees is off by at most 2^-16 degrees, 4.5 roundings; several angles add
+    assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM
+    # the terms of the derivation for the other two forms
+    assert 1.0 < worst["Orient"] <= 4.0
+    assert 0.5 < worst["Transform"] <= math.sqrt(1.5)

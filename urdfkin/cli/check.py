@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import io
 import os
@@ -479,7 +480,9 @@ class Run:
         text = Text(b"", file, file)
         wanted = self.choice.of(text)
         findings = tuple(self._with_severity(finding) for finding in found if wanted(finding))
-        self.outcome.add(file, Examined(text, b"", None, findings, ()))
+        has_lines = any(one.width and one.file == file for one in findings)
+        data = read_bytes(Path(file)).removeprefix(codecs.BOM_UTF8) if has_lines else b""
+        self.outcome.add(file, Examined(text, data, None, findings, ()))
 
     def _is_unchanged(self, file: str, parts: tuple[str, ...], version: Version) -> bool:
         """Return whether a file, and every file that it may refer to, is the same as in an older version.

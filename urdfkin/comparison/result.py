@@ -367,9 +367,13 @@ class Sameness(Displayable):
         return self.verdict is not Verdict.DIFFERS
 
     def __repr__(self) -> str:
+        return log_line(f"<Sameness {self.names[0]}, {self.names[1]}: {self._verdict}>")
+
+    @property
+    def _verdict(self) -> str:
+        """The verdict in words, with the changes of B if it depends on them."""
         after = self.verdict is Verdict.SAME_AFTER
-        how = f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
-        return log_line(f"<Sameness {self.names[0]}, {self.names[1]}: {how}>")
+        return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
     def _sheet(self) -> TextDocument:
         found: TextDocument = hook("a comparison as a document")(self)
@@ -532,11 +536,10 @@ class Sameness(Displayable):
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
             if rule != JointRule():
                 rules[one.a] = rule
-        how = f"equivalent up to {', '.join(self.up_to)}" if self.up_to else self.verdict.value
         found = Convention(
             name=self.names[1],
             title=f"{self.sources[0]} with the joints of {self.sources[1]}",
-            note=f"found by urdfkin same {' '.join(self.sources)}: {how}",
+            note=f"found by urdfkin same {' '.join(self.sources)}: {self._verdict}",
             order="given",
             joints=tuple(joints),
             rules=rules,

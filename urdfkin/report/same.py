@@ -131,6 +131,15 @@ def far_frames(found: Sameness) -> list[Interval]:
     )
 
 
+def farthest(found: Sameness) -> str:
+    """Return the heading of the table of `far_frames`.
+
+    A result up to single precision is about the models as they are written, but this table is not.
+    """
+    changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
+    return f"Largest distance over all configurations within limits{changed}"
+
+
 def rows(frames: Sequence[Interval]) -> list[list[str]]:
     """Return the rows of the table with the columns `HEADS`."""
     return [[frame.frame, length(frame.lower), length(frame.upper), angle(frame.radians)] for frame in frames]
@@ -190,7 +199,7 @@ def document(found: Sameness, question: Question = EQUIVALENT, *, all_: bool = F
     parts += _lines("differences", words[1:] if words and words[0] in head else words, some)
     frames = far_frames(found)
     if frames:
-        parts.append("largest distance over all configurations within limits:")
+        parts.append(f"{farthest(found).lower()}:")
         parts += [Table(HEADS, rows(frames[:some])), *_rest(len(frames), some)]
         if off := attained(frames[0]):
             parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
@@ -206,7 +215,7 @@ def _reasons(found: Sameness) -> tuple[tuple[str, ...], list[str]]:
 
 
 #: Columns of the table of several pairs.
-PAIRS = ("A", "B", "verdict", "at most apart", "single precision")
+PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
 
 
 def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str, ...]]:
@@ -257,7 +266,7 @@ def as_document(found: Sameness) -> TextDocument:
         parts += [f"... and {len(lines) - SHOWN} more lines"] if len(lines) > SHOWN else []
     if frames := far_frames(found):
         parts += [
-            "Largest distance over all configurations within limits:", Table(HEADS, rows(frames[:SHOWN])),
+            f"{farthest(found)}:", Table(HEADS, rows(frames[:SHOWN])),
         ]  # fmt: skip
         parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
         if off := attained(frames[0]):
@@ -309,7 +318,7 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
             lines.append("")
     frames = far_frames(found)
     if frames:
-        lines += ["Largest distance over all configurations within limits:", ""]
+        lines += [f"{farthest(found)}:", ""]
         lines += [f"| {' | '.join(HEADS)} |", "| --- | ---: | ---: | ---: |"]
         lines += [f"| {' | '.join(map(text, row))} |" for row in rows(frames[: 4 * SHOWN])]
         lines.append("")
@@ -365,6 +374,7 @@ def as_html(
             versions=versions(),
             command=command_of(robots, question, options),
             heads=HEADS,
+            farthest=farthest(found),
             frames=rows(frames),
             as_written=as_written(found),
             renamed=renamed(found),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import warnings
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,7 @@ from urdfkin.robot import Robot
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.urdf.findings import Finding, PinocchioReading, Reporter, Severity, UrdfError, UrdfWarning
 from urdfkin.urdf.lint.rules.joints import MIMIC_CONTINUOUS, tilts
-from urdfkin.urdf.lint.rules.left_out import left_out
+from urdfkin.urdf.lint.rules.left_out import of_mjcf
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.parser import NEWER_VERSION
 from urdfkin.urdf.reader import read_tree
@@ -210,11 +211,12 @@ def _load_mjcf(
 
     _refuse_arguments(xacro_args, "MJCF")
     wanted = bool(checked_choice(how["verify"]))
-    digest = hashlib.sha256(_bytes_of_mjcf(source)).hexdigest()
+    data = _bytes_of_mjcf(source)
+    digest = hashlib.sha256(data).hexdigest()
     read = read_mjcf(source, check=wanted)
     name = as_word(Path(read.path)) if read.path else streamed.source if streamed else name_of(source)
     text = Text(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
-    listed = tuple(left_out(one, name) for one in read.listed)
+    listed = of_mjcf(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
     robot = robot_of(text, **how, listed=listed, made=True)
     if wanted:
         plain = _is_plain(robot)
@@ -241,7 +243,8 @@ def _load_usd(
         as_str(articulation, "articulation")
     wanted = bool(checked_choice(how["verify"]))
     read = read_usd(source, variants=variants, articulation=articulation)
-    digest = hashlib.sha256(read_bytes(Path(read.path))).hexdigest()
+    data = read_bytes(Path(read.path))
+    digest = hashlib.sha256(data).hexdigest()
     name = as_word(Path(read.path))
     text = Text(
         read.urdf.encode(),
@@ -253,7 +256,7 @@ def _load_usd(
     )
     verifier = robot_of(text, verify=False, made=True, quiet=True).verifier
     line, remarks = check_usd_source(verifier, read)
-    listed = tuple(of_usd(one, name) for one in (*read.remarks, *remarks))
+    listed = of_usd((*read.remarks, *remarks), name, data)
     robot = robot_of(text, **how, listed=listed, made=True)
     robot.single = single_precision(robot.tree, read.answer["single"])
     robot.prims = read.answer["prims"]

@@ -222,6 +222,8 @@ class Finding:
         if self.element is None:
             return ""
         tag = shortened(self.element)
+        if self.element == "prim" and self.name is not None and len(self.name) > QUOTED:
+            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"  # the end of a path names the prim
         return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
 
     @property
@@ -674,7 +676,7 @@ class Reporter:
         span = None if attribute is None else self._spans(at).get(attribute)
         if span is None:
             return at.line, at.column, 1 + len(at.tag)
-        first = _NEWLINE.split(self.data[span.start : span.value[1] + 1], 1)[0]
+        first = NEWLINE.split(self.data[span.start : span.value[1] + 1], 1)[0]
         return span.line, span.column, len(first.decode("utf-8", "replace"))
 
     def rewritten(self, at: Element, attribute: str, value: str, turns: float = 0.0) -> Fix | None:
@@ -731,7 +733,7 @@ class _AttributeSpan:
 #: An XML parser replaces these characters. Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
-_NEWLINE = re.compile(rb"\r\n|\r|\n")
+NEWLINE = re.compile(rb"\r\n|\r|\n")
 _REST_OF_LINE = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
@@ -742,7 +744,7 @@ def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]
         return
     line, column, cursor = at.line, at.column, at.offset
     for match in ATTRIBUTE.finditer(data, at.offset + len(at.tag.encode()) + 1, tag.end()):
-        lines = _NEWLINE.split(data[cursor : match.start()])
+        lines = NEWLINE.split(data[cursor : match.start()])
         column = len(lines[-1].decode("utf-8", "replace")) + (column if len(lines) == 1 else 1)
         line, cursor = line + len(lines) - 1, match.start()
         yield match[1].decode(), _AttributeSpan(line, column, cursor, (match.start(2) + 1, match.end(2) - 1))

@@ -57,7 +57,7 @@ class Listed:
 
     Attributes:
         what: A description in one clause.
-        where: The element, or None for the file.
+        where: The tag and the name of the element, or the tag alone; None for the file.
         moves: Whether this part affects the motion.
         remedy: The remedy of a probable mistake; None for a part that is left out.
     """
@@ -365,7 +365,7 @@ def _refuse_fused(aligned: list[Any], name: str) -> None:
 
 
 def _align_note(body: str, *, whole: bool) -> Listed:
-    where = f"body {body}" if body else "a body without a name"
+    where = f"body {body}" if body else "body"
     if whole:
         return Listed("MuJoCo aligns this free body: its frame is its inertial frame", where)
     what = (
@@ -403,9 +403,9 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
             what = f"a constraint ({kind}{names and ' of '}{names}) that a tree cannot represent"
             yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
     useless = dict(_useless(spec))
-    for words in ("tendons", "flexes"):
+    for words, tag in (("tendons", "tendon"), ("flexes", "flex")):
         if words in useless:
-            yield Listed(f"{words} have no effect here", words, moves=True)
+            yield Listed(f"{words} have no effect here", tag, moves=True)
     if useless:
         counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
         yield Listed(f"left out, since kinematics does not use them: {counts}")

@@ -19,8 +19,9 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import stat
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import product
@@ -60,8 +61,14 @@ _LARGEST = float(np.finfo(np.float32).max)
 #: scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u, which is below 14 u. Rounding a
 #: quaternion changes its length by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
+#: Limits of a joint up to this number hold it at one value, whether they are degrees or radians.
+_SMALLEST_ANGLE = 0.01
 _NONE = (-math.inf, math.inf)
+#: First bytes of a file that Git LFS has not fetched.
+_LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
+#: A relationship to the mimicked joint; the group is the direction that the name of PhysX's schema contains.
+_MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: If the name of a type or of an applied schema contains one of these words, it couples joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Endings of the type names of joints that a tree cannot represent.
@@ -212,6 +219,10 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
                     "the files of this stage are too large", where=where, found=f"over {MOST} bytes"
                 )
             files[outer] = None
+        if _starts_with(outer, _LFS):
+            raise InputError(
+                "this file is a pointer of Git LFS, not USD", where=outer, remedy="run git lfs pull"
+            )
         layer = pxr.Sdf.Layer.FindOrOpen(identifier)
         if layer is None:
             raise InputError("OpenUSD does not accept this file", where=identifier)
@@ -253,8 +264,11 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
         raise _refused("a reference is an address, and urdfkin fetches nothing", where, written)
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
-    if not os.path.isabs(outer):  # noqa: PTH117  resolved below
-        outer = os.path.abspath(outer)  # noqa: PTH100  `Ground.holds` resolves links
+    if not os.path.isabs(outer):  # noqa: PTH117  OpenUSD finds no such file beside the layer
+        # OpenUSD would look in the current folder too
+        here = os.path.abspath(outer)  # noqa: PTH100  `Ground.holds` resolves links
+        beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
+        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  not every name is a path
     if not ground.holds(outer):
         raise _refused(
             "a reference leads outside the folder, package and repository of the stage", where, written
@@ -271,6 +285,11 @@ def _refused(what: str, where: str, found: str) -> InputError:
         found=found[:200],
         remedy="copy the file beside the stage, or flatten the stage: usdcat --flatten",
     )
+
+
+def _starts_with(path: str, text: bytes) -> bool:
+    with open(path, "rb") as file:  # noqa: PTH123  not every name is a path
+        return file.read(len(text)) == text
 
 
 def _size(path: str, where: str) -> int:
@@ -594,6 +613,14 @@ class _Reader:
         if not joint and (ends or any(word in kind for word in _COUPLINGS)):
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._say("left-out-of-usd", path, what)
+        for rule in prim.GetRelationships() if joint else ():
+            # "newton:mimicJoint", or "physxMimicJoint:rotX:referenceJoint" with any direction
+            own = _MIMIC_RULE.fullmatch(rule.GetName())
+            if own is not None and rule.HasAuthoredTargets():
+                schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
+                if schema not in schemas:
+                    what = f"{rule.GetName()} has no effect, because {schema} is not applied"
+                    self._say("lost-mimic", path, what, "apply the schema, or remove the attributes")
         unread = []
         for schema in schemas:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
@@ -674,7 +701,7 @@ class _Reader:
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return one body of a joint, and data of the joint frame; None if the target does not exist.
+        """Return one body of a joint, and data of the joint frame; None if no prim is defined at the target.
 
         The data are the pose of the joint frame in the body (m), and the sum of the lengths (m) of the
         vectors in its origin. The other data are two bounds on the effect of rounding to single precision:
@@ -695,7 +722,7 @@ class _Reader:
         if target is None:
             return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
         other = self.stage.GetPrimAtPath(target)
-        if not other or self._instanced(target):
+        if not other or not other.IsDefined() or self._instanced(target):
             return None
         T, scale = self._placed(other)
         A, length = pose(R, scale * p), float(np.linalg.norm(scale * p))
@@ -894,7 +921,12 @@ class _Reader:
         merged: dict[str, list[_Articulation]] = {}
         for group in found:
             merged.setdefault(self._root(group) or group.path, []).append(group)
-        return [own[0] if len(own) == 1 else self._together(own, path) for path, own in merged.items()]
+        found = [own[0] if len(own) == 1 else self._together(own, path) for path, own in merged.items()]
+        paths = Counter(group.path for group in found)
+        for group in found:
+            if paths[group.path] > 1:  # a joint between them is missing: name each by its root body
+                group.path = self._root(group) or group.bodies[0]
+        return found
 
     def _name(self, group: _Articulation) -> None:
         """Name a group by its articulation root, or by its root body if it has no articulation root."""
@@ -1112,7 +1144,8 @@ class _Reader:
                     "a limit on one side only: the URDF, which has no such limit, has none",
                 )
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
-        if turns and max(abs(lower), abs(upper)) <= math.radians(LARGEST_ANGLE) and upper > lower:
+        largest = math.degrees(max(abs(lower), abs(upper)))
+        if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
             self._say(
                 "limit-unit", edge.path, f"the limits of this joint are {words}: they are probably radians",

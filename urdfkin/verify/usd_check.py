@@ -61,8 +61,15 @@ _ROTATION = 18.0
 #: Number of roundings in the computation of a joint's origin. The scale factor, its product with the origin,
 #: and the transformed origin are rounded.
 _ORIGIN = 3.0
-#: Bound on the angle error (rad) of a prim's rotation, divided by `SINGLE`. The rotation has three angles,
-#: and each angle is at most one turn (2 pi).
+#: Bound on the angle error (rad) of one operation of a prim's transform, divided by u = `SINGLE`.
+#: Angles: up to three rotations, each of at most one turn, so each is off by at most 2 pi u, and errors add.
+#: Quaternion: the errors of its numbers form a vector of length u at most. The part across the quaternion
+#: turns by 2 u at most. The part along it changes its length by u; UsdGeom does not normalize it, so that a
+#: rotation by t is off by 2 u sin t at most. Together 4 u.
+#: Matrix: the errors of its nine numbers form a vector of length sqrt(3) u at most, and removing the scales
+#: of the rows makes it no longer. A rotation by a small angle t changes the matrix by a vector of length
+#: sqrt(2) t, so the rotation is off by at most sqrt(3/2) u.
+#: The largest of the three is the bound. `_at_rest` counts one operation for each joint on the path.
 _TRANSFORM = 6.0 * np.pi
 
 

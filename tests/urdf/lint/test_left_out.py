@@ -37,7 +37,12 @@ def test_each_thing_alone_is_said_in_its_words_and_nothing_else(case: Mjcf) -> N
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         robot = urdfkin.load(case.text, verify=False)
-    found = [(f.code, f.message) for f in robot.findings if f.code in OF_MJCF]
+    of_mjcf = [f for f in robot.findings if f.code in OF_MJCF]
+    places = [" ".join(filter(None, (f.element, f.name))) for f in of_mjcf]
+    found = [
+        (f.code, f"{place}: {f.message}" if place else f.message)
+        for f, place in zip(of_mjcf, places, strict=True)
+    ]
     assert sorted(found) == sorted(case.findings)
     assert sum("MJCF101" in str(w.message) for w in caught) == [code for code, _ in found].count("MJCF101")
 

@@ -73,7 +73,7 @@ CASES = [
     Mjcf(
         "a-tendon",
         _two(inside='<site name="s"/>', world='<site name="r"/>', more=_SPATIAL),
-        "MJCF101 tendons: tendons have no effect here",
+        "MJCF101 tendon: tendons have no effect here",
         f"MJCF102 {_USELESS}1 tendons",
     ),
     Mjcf(

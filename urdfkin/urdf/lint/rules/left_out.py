@@ -1,12 +1,23 @@
-"""Findings of `load` about MJCF and USD: parts that a tree cannot represent, and probable mistakes."""
+"""Findings of `load` about MJCF and USD: parts that a tree cannot represent, and probable mistakes.
+
+A finding contains its element: the tag and the name of an MJCF element, or the path of a prim. If the element
+is in the text of the file itself, the finding also has its line. Elements of included files and layers, of
+binary files, and beyond the first 10 MB have no line.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from html import unescape
 from typing import TYPE_CHECKING
 
-from urdfkin.urdf.findings import NOTE, WARNING, Finding, Rule
+from urdfkin.urdf.findings import NEWLINE, NOTE, WARNING, Finding, Rule
+from urdfkin.urdf.records import ATTRIBUTE, START_TAG
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from urdfkin.urdf.mjcf import Listed
     from urdfkin.urdf.usd import Remark
 
@@ -28,18 +39,148 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-def left_out(one: Listed, file: str) -> Finding:
-    """Return a finding for a part of an MJCF file that the tree does not represent, or for a mistake.
+#: Bytes of a file in which elements are searched.
+_SEARCHED = 10_000_000
+#: For the beginning of XML that is not an element: its end.
+_NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
+#: Elements of MJCF that are findings without a name, by tag.
+_NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
+#: A prim in the text form of USD, or the beginning of a comment, string, asset, array or scope, or its end.
+_USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
+#: For the beginning of a part of USD without prims: the pattern of its end.
+_NO_PRIM = {
+    b"#": re.compile(rb"[\r\n]"),
+    b"[": re.compile(rb"\]"),
+    **{quote: re.compile(rb"(?:\\.|[^\\])*?" + quote, re.DOTALL) for quote in (b'"""', b"'''", b'"', b"'")},
+    b"@@@": re.compile(rb"@@@"),
+    b"@": re.compile(rb"@"),
+}
+#: Line and column, from 1, and width of an element, by element and name.
+_Places = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
+
+
+def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, ...]:
+    """Return a finding for each part of an MJCF file that the tree does not represent, and for each mistake.
 
     The finding is a warning if the part affects the motion or is a probable mistake, otherwise a note.
+
+    Args:
+        listed: The parts and mistakes.
+        file: The file's name in messages.
+        data: The bytes of the file.
     """
-    rule = LEFT_OUT_MOTION if one.moves else LEFT_OUT if one.remedy is None else ANGLE_UNIT
-    message = one.what if one.where is None else f"{one.where}: {one.what}"
-    return Finding(rule.id, rule.severity, message, remedy=one.remedy, file=file)
+    found = [(one, *_element(one.where)) for one in listed]
+    places = _placed(data, _elements) if any(element for _, element, _ in found) else {}
+    return tuple(
+        _finding(
+            LEFT_OUT_MOTION if one.moves else LEFT_OUT if one.remedy is None else ANGLE_UNIT,
+            one, file, element, name, places,
+        )
+        for one, element, name in found
+    )  # fmt: skip
 
 
-def of_usd(one: Remark, file: str) -> Finding:
-    """Convert a remark about a USD stage to a finding. The finding contains the path of the prim."""
-    rule = next(rule for rule in globals().values() if isinstance(rule, Rule) and rule.slug == one.kind)
-    element, name = ("prim", one.where) if one.where else (None, None)
-    return Finding(rule.id, rule.severity, one.what, remedy=one.remedy, file=file, element=element, name=name)
+def of_usd(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, ...]:
+    """Return a finding for each remark about a USD stage; its name is the path of the prim.
+
+    Args:
+        remarks: The remarks.
+        file: The file's name in messages.
+        data: The bytes of the file.
+    """
+    found = tuple(remarks)
+    rules = {rule.slug: rule for rule in globals().values() if isinstance(rule, Rule)}
+    is_text = data.startswith(b"#usda") and any(one.where for one in found)
+    places = _placed(data, _prims) if is_text else {}
+    return tuple(
+        _finding(rules[one.kind], one, file, "prim" if one.where else None, one.where or None, places)
+        for one in found
+    )
+
+
+def _finding(
+    rule: Rule, one: Listed | Remark, file: str, element: str | None, name: str | None, places: _Places
+) -> Finding:
+    line, column, width = places.get((element, name), (1, 1, 0))
+    return Finding(
+        rule.id, rule.severity, one.what, None, one.remedy, file, line, column, element, name, width=width
+    )
+
+
+def _element(where: str | None) -> tuple[str | None, str | None]:
+    """Return the tag and the name of a place such as `joint elbow`."""
+    tag, _, name = (where or "").partition(" ")
+    return tag or None, name or None
+
+
+def _placed(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
+    """Return the place of each element that a search finds; of several with one name, the first."""
+    found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
+    for element, name, first, last in search(data[:_SEARCHED]):
+        found.setdefault((element, name), (first, last))
+    places, line, start, cursor = {}, 1, 0, 0
+    for key, (first, last) in sorted(found.items(), key=lambda item: item[1]):
+        for end in NEWLINE.finditer(data, cursor, first):
+            line, start = line + 1, end.end()
+        cursor = first
+        before, marked = (data[i:j].decode("utf-8", "replace") for i, j in ((start, first), (first, last)))
+        places[key] = line, len(before) + 1, len(marked.splitlines()[0])
+    return places
+
+
+def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
+    """Yield the tag, the name and the span of each element of an MJCF text that a finding can have.
+
+    An equality without a name has its number among all equalities, unless another file is included.
+    """
+    above, equalities, includes = list[str](), 0, False
+    at = data.find(b"<")
+    while at >= 0:
+        end = next((end for begin, end in _NO_ELEMENT.items() if data.startswith(begin, at)), None)
+        tag = None if end else START_TAG.match(data, at)
+        if end is not None:
+            at = data.find(end, at)
+            if at < 0:
+                return
+        elif tag is None or data.startswith(b"</", at):
+            del above[-1:]
+        else:
+            word = tag[0][1:].split(None, 1)[0].rstrip(b"/>").decode("utf-8", "replace")
+            last, name = at + 1 + len(word.encode()), None
+            for one in ATTRIBUTE.finditer(data, last, tag.end()):
+                if one[1] == b"name":
+                    name, last = unescape(one[2][1:-1].decode("utf-8", "replace")), one.end()
+            includes = includes or word == "include"
+            if "worldbody" in above and word in ("body", "joint", "freejoint") and name is not None:
+                yield word.removeprefix("free"), name, at, last
+            elif above[-1:] == ["equality"] and "default" not in above:
+                if name is not None or not includes:
+                    yield "equality", str(equalities) if name is None else name, at, last
+                equalities += 1
+            elif word in _NAMELESS and "default" not in above:
+                yield _NAMELESS[word], None, at, last
+            if not tag[0].endswith(b"/>"):
+                above.append(word)
+        at = data.find(b"<", at + 1)
+
+
+def _prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
+    """Yield the path and the span of each prim in the text form of USD, also of prims inside variants."""
+    above, prim, cursor, inside = list[str](), "", 0, 0
+    while (found := _USDA.search(data, cursor)) is not None:
+        cursor, token = found.end(), found[0]
+        if found[1] is not None:
+            prim = "/" + found[1].decode("utf-8", "replace")
+            yield "prim", "".join(above) + prim, found.start(), found.end()
+        elif token in b"()":  # metadata: its braces hold dictionaries
+            inside += 1 if token == b"(" else -1
+        elif token == b"{":
+            above += [] if inside else [prim]
+            prim = prim if inside else ""
+        elif token == b"}":
+            del above[len(above) if inside else -1 :]
+        else:
+            end = _NO_PRIM[token].search(data, cursor)
+            if end is None:
+                return
+            cursor = end.end()
