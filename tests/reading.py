@@ -1,11 +1,48 @@
-"""A text read as `urdfkin.load` reads it, whatever is found in it."""
+"""What tests read: robots whatever is found in them, records and trees of texts, and modules of files."""
 
+from __future__ import annotations
+
+import importlib.util
+import warnings
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar
+
+import urdfkin
 from urdfkin.model.tree import KinematicTree
+from urdfkin.robot import Robot
 from urdfkin.urdf.findings import Reporter
 from urdfkin.urdf.lint import UrdfError
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.records import RobotRecord
+from urdfkin.urdf.writer import to_urdf
+
+T = TypeVar("T")
+
+
+def present(value: T | None) -> T:
+    """Return a value that must not be None."""
+    assert value is not None
+    return value
+
+
+def loaded(source: Any, **options: Any) -> Robot:
+    """Load a robot or a tree, and ignore the warnings about it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
+        robot: Robot = urdfkin.load(
+            to_urdf(source) if isinstance(source, KinematicTree) else source, **options
+        )
+        return robot
+
+
+def module_of(path: Path) -> ModuleType:
+    """Import a file."""
+    spec = present(importlib.util.spec_from_file_location(path.stem, path))
+    found = importlib.util.module_from_spec(spec)
+    present(spec.loader).exec_module(found)
+    return found
 
 
 def records(data: bytes) -> RobotRecord:

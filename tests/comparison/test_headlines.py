@@ -13,6 +13,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.comparison.test_pairs import FOLLOWING
+from tests.reading import present
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Question, Verdict
 from urdfkin.robot import Robot
@@ -104,8 +105,7 @@ def test_what_differs_in_orientation_alone_is_told_in_radians() -> None:
 def test_a_joint_of_another_kind_is_searched() -> None:
     a, b = arm(), arm(second="prismatic")
     found = urdfkin.same(a, b)
-    worst = found.worst
-    assert worst is not None
+    worst = present(found.worst)
 
     far = math.hypot(1.0, 0.1 * math.sin(1.0), 0.1 * (1.0 - math.cos(1.0)))  # a bend of 1 rad, a slide of 1 m
     assert worst.lower == pytest.approx(far, rel=1e-3)
@@ -152,8 +152,7 @@ def test_limits_that_differ_stand_in_the_headline() -> None:
 def test_intervals_cover_the_files_limits_where_mimic_joints_leave_theirs() -> None:
     a, b = finger(-1.0), finger(-1.01)
     found = urdfkin.same(a, b)
-    assert found.worst is not None
-    assert found.worst.lower == pytest.approx(550e-6, rel=1e-3)
+    assert present(found.worst).lower == pytest.approx(550e-6, rel=1e-3)
     assert [found.exit_code(within=most) for most in (1e-4, 5.49e-4, 5.6e-4)] == [1, 1, 0]
     assert headline(a, b, within=1e-4).startswith(
         "NOT WITHIN 0.0001 m and rad without changes of B: b is 0.55 mm"
@@ -256,8 +255,7 @@ def test_a_link_that_moved_on_a_body_without_joints_is_a_difference() -> None:
     )
     found = urdfkin.same(text.format(0, 1), text.format(0.5, 0.5))
     assert found.verdict is Verdict.DIFFERS
-    assert found.worst is not None
-    assert found.worst.lower == pytest.approx(0.5)
+    assert present(found.worst).lower == pytest.approx(0.5)
 
 
 def test_metres_that_are_only_bounded_are_given_as_a_bound() -> None:

@@ -16,6 +16,7 @@ import urdfkin
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
 from tests.dh.test_compare import disguised, elbow
+from tests.reading import present
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.dh import dh_table
@@ -54,8 +55,7 @@ def test_what_is_not_is_found_out_and_the_joint_named(turn: int) -> None:
     tree = robot(ROBOTS[turn]).tree
     if not pairs.moving(tree):
         return
-    other = changed(ROBOTS[turn], what)
-    assert other is not None
+    other = present(changed(ROBOTS[turn], what))
     found = urdfkin.same(robot(ROBOTS[turn]), other, bounds=False)
     assert found.verdict is Verdict.DIFFERS, what
     chain = pairs.moving(tree)
@@ -127,8 +127,7 @@ def test_a_table_with_other_signs_zeros_base_and_tool_is_the_same_robot(kinds: s
 
 def test_joints_of_one_name_are_each_others_however_many_hang_on_a_body() -> None:
     a = robot("go2")
-    b = changed("go2", "axis bent")
-    assert b is not None
+    b = present(changed("go2", "axis bent"))
     found = urdfkin.same(a, b)
     assert [one.a for one in found.joints] == [one.b for one in found.joints]
     assert recheck(certificate(found), a, b) == []
@@ -139,8 +138,9 @@ def test_a_vendors_table_off_by_its_last_digit_is_off_by_no_more() -> None:
     table = Path(__file__).parents[2] / "robots" / "dh" / "kinova.toml"
     found = urdfkin.same("kinova", table)
     assert found.verdict is Verdict.DIFFERS
-    assert found.worst is not None
-    assert found.worst.upper == pytest.approx(5e-5, rel=1e-6)  # d4 is given as 0.3111 m, not as 0.31105
+    assert present(found.worst).upper == pytest.approx(
+        5e-5, rel=1e-6
+    )  # d4 is given as 0.3111 m, not as 0.31105
 
 
 @pytest.mark.slow

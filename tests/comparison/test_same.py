@@ -17,6 +17,7 @@ import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
+from tests.reading import present
 from urdfkin.comparison.certificate import SAME, certificate, recheck, words_of
 from urdfkin.comparison.result import Verdict
 from urdfkin.model.mechanisms.mechanism import JointTransform, Mechanism
@@ -28,9 +29,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 def other(name: str, what: str) -> Robot:
-    found = changed(name, what)
-    assert found is not None
-    return found
+    return present(changed(name, what))
 
 
 def test_a_robot_is_itself_and_pinocchio_sees_no_distance() -> None:
@@ -82,8 +81,7 @@ def test_a_follower_that_was_dropped_is_found() -> None:
         "joint panda_finger_joint2 is a mimic joint in A and an independent joint in B: 1.0"
         " panda_finger_joint1 +0"
     ]
-    assert found.worst is not None
-    assert found.worst.lower == pytest.approx(0.04)  # one finger open, the other closed
+    assert present(found.worst).lower == pytest.approx(0.04)  # one finger open, the other closed
 
 
 @pytest.mark.slow
@@ -493,8 +491,7 @@ def test_a_mimic_joint_with_multiplier_zero_and_a_joint_fixed_elsewhere_differ()
     fixed = urdfkin.load(_IDLE.format(limit=_RANGE, kind="fixed", x=1, y=0.2, rest=""))
     found = urdfkin.same(_idle("revolute", 0.25), fixed)
     assert found.verdict is Verdict.DIFFERS
-    assert found.worst is not None
-    assert found.worst.radians == pytest.approx(0.05)
+    assert present(found.worst).radians == pytest.approx(0.05)
     assert not any("only in" in one.what for one in found.differences)
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from tests.cli.test_dh import run
 from tests.dh.test_compare import elbow
+from tests.reading import present
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
 from urdfkin.dh.compare import TOLERANCE, diagnose
 from urdfkin.dh.compare.slips import as_said, doubts, other_readings
@@ -63,8 +64,7 @@ def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) ->
     path = load(reference.robot).chain(reference.tip_frame, reference.base_frame)
     options, words = SLIPS[slip]
     wrong = "modified" if str(reference.convention) == "standard" else "standard"
-    found = diagnose(path, written(reference, wrong, **options), TOLERANCE)
-    assert found is not None
+    found = present(diagnose(path, written(reference, wrong, **options), TOLERANCE))
     assert found.reading.words(found.said).startswith(words.format(reference.convention))
     assert found.metres <= 5.01e-5
     assert found.reading.slips(found.said) <= 4
@@ -73,8 +73,7 @@ def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) ->
 @pytest.mark.parametrize("kinds", ["RRPRRR", "PRRRRR"])
 def test_a_slip_is_named_where_a_joint_slides(kinds: str) -> None:
     tree = elbow(kinds)
-    found = diagnose(chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6)
-    assert found is not None
+    found = present(diagnose(chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6))
     assert found.reading.words(found.said) == "millimetres"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
@@ -14,9 +13,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import urdfkin
-from tests.export.test_languages import module
 from tests.export.writing import code, file
 from tests.laws.subjects import robot_of, state
+from tests.reading import loaded, module_of
 from urdfkin.export import proof, single
 from urdfkin.export.expression import Graph, Node
 from urdfkin.export.function import Function
@@ -171,17 +170,10 @@ _FIXED = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type
 <child link="b"/><origin xyz="{}" rpy="{}"/></joint></robot>"""
 
 
-def loaded(text: str) -> urdfkin.Robot:
-    """A robot whose lengths may be unusual."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(text)
-
-
 def shares(text: str, folder: Path) -> dict[tuple[str, str], float]:
     """What a file finds itself, in both precisions."""
     written = code(loaded(text), "b", ("placement",))
-    found: dict[tuple[str, str], float] = module(file(written, "array", folder)).check()
+    found: dict[tuple[str, str], float] = module_of(file(written, "array", folder)).check()
     return found
 
 
@@ -204,7 +196,7 @@ def test_a_file_needs_the_errors_of_its_double_constants(
 
 def shares_of(robot: urdfkin.Robot, quantities: tuple[str, ...], folder: Path, frame: str) -> float:
     """The largest error of a file in double precision, as a share of its bound."""
-    own = module(file(code(robot, frame, quantities), "array", folder))
+    own = module_of(file(code(robot, frame, quantities), "array", folder))
     return max(float(share) for (_, kind), share in own.check().items() if kind == "float64")
 
 
@@ -295,7 +287,7 @@ def test_the_bound_holds_in_many_configurations_and_is_not_much_larger_than_the_
 ) -> None:
     robot = robot_of(name)
     written = code(robot, quantities=("placement", "jacobian", "jacobian_rate", "acceleration"))
-    own = module(file(written, "array", tmp_path))
+    own = module_of(file(written, "array", tmp_path))
     given = [x.astype(np.float32).astype(np.float64) for x in state(robot, 200, 3)]
     for of in written.functions:
         used = given[: len(of.inputs)]

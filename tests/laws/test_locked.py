@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.laws.subjects import robot_of, state
+from tests.reading import loaded, present
 from tests.strategies import trees
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.errors import OracleError
@@ -53,8 +54,7 @@ def values_at(robot: Robot, q: FloatArray, names: list[str]) -> dict[str, float]
 
 
 def held(robot: Robot, name: str) -> float:
-    lock = robot.joints[name].lock
-    assert lock is not None
+    lock = present(robot.joints[name].lock)
     return lock.value
 
 
@@ -136,9 +136,7 @@ def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> Non
 @given(st.data())
 def test_any_tree_with_any_joints_locked_is_the_whole_tree_at_these_values(data: st.DataObject) -> None:
     text = to_urdf(data.draw(trees(max_joints=6)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        robot = urdfkin.load(text, verify=False)
+    robot = loaded(text, verify=False)
     names = [name for name in lockable(robot) if data.draw(st.booleans())]
     q = robot.sample(1, seed=data.draw(st.integers(0, 99)))[0]
     locked = demand_the_columns(robot, names, q, np.random.default_rng(5))
@@ -164,9 +162,7 @@ def test_a_link_may_have_the_name_of_a_locked_joint(
     )
     text = f'<robot name="r">{"".join(f"<link name={name!r}/>" for name in links)}{joints}</robot>'
     locked_joints = lock if multiplier is None else "0"  # a mimic joint has no value of its own
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # the multiplier is 0
-        locked = urdfkin.load(text).locked(dict.fromkeys(locked_joints, 0.3))
+    locked = loaded(text).locked(dict.fromkeys(locked_joints, 0.3))  # the multiplier is 0
     locked.placement(locked.sample(2), locked.link_frames)
     assert locked.certificate().verified
 
@@ -179,9 +175,9 @@ def test_a_slide_that_is_locked_back_to_its_parent_keeps_its_rounding_in_the_bou
     length = math.hypot(*p)
     axis = rotation_from_rpy([0.4, -1.1, 2.2]).T @ p
     axis /= math.hypot(*axis)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # the axis is a unit vector to rounding only
-        whole = urdfkin.load(text.replace("AXIS", " ".join(map(repr, axis.tolist()))))
+    whole = loaded(
+        text.replace("AXIS", " ".join(map(repr, axis.tolist())))
+    )  # the axis is a unit vector to rounding only
     for value in (-length, np.nextafter(-length, 0.0), 7.3):
         locked = whole.locked({"s": float(value)})
         locked.placement([], "b")

@@ -17,6 +17,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as command
+from tests.reading import loaded
 from tests.urdf.lint.cases.arm import arm
 from urdfkin.errors import InputError, OracleError
 from urdfkin.model.tree import FloatArray, pose
@@ -57,12 +58,6 @@ TWO = """
   <actuator><motor joint="f"/><position tendon="t"/></actuator>
 </mujoco>
 """
-
-
-def loaded(source: Source, **options: object) -> urdfkin.Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(source, **options)  # type: ignore[arg-type]
 
 
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:

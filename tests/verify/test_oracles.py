@@ -15,6 +15,7 @@ import pytest
 import urdfkin
 from scripts.fuzzing import robots
 from tests.cli.running import Done, process
+from tests.reading import loaded
 from tests.urdf.lint.cases.arm import arm, fixed
 from urdfkin.errors import InstallationError, UnknownNameError
 from urdfkin.model.reference import Reference
@@ -145,9 +146,7 @@ def ask_everything(robot: urdfkin.Robot, n: int, base: urdfkin.BaseMotion | None
 @pytest.mark.parametrize("far", [None, 1.0, 1e6], ids=lambda far: f"base {far}")
 def test_mujoco_agrees_in_every_quantity_and_reference(name: str, far: float | None) -> None:
     text, options = SUBJECTS[name]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        robot = urdfkin.load(text, oracle="mujoco", **options)
+    robot = loaded(text, oracle="mujoco", **options)
     ask_everything(robot, 5, None if far is None else base_motion(np.random.default_rng(0), far))
     certificate = robot.certificate()
     assert certificate.verified, certificate
@@ -264,14 +263,8 @@ ARM = """<robot name="arm">
 </robot>"""
 
 
-def quiet_load(source: str, **how: Any) -> urdfkin.Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(source, verify=False, **how)
-
-
 def reading(text: str, **how: Any) -> SecondReading:
-    robot = quiet_load(text, **how)
+    robot = loaded(text, verify=False, **how)
     added = robot.root_joint is not None
     return second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic, root_joint=added)
 
@@ -287,7 +280,7 @@ def test_both_readers_agree_on_the_catalogue(name: str) -> None:
 @pytest.mark.slow
 def test_both_readers_agree_on_the_whole_catalogue() -> None:
     for name in catalogue():
-        robot = quiet_load(name)
+        robot = loaded(name, verify=False)
         found = second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic)
         assert (found.differences, found.unread) == ((), None), name
 
@@ -394,12 +387,12 @@ def test_a_file_that_yourdfpy_cannot_read_is_named_and_is_no_failure(monkeypatch
 
 
 def test_a_document_type_is_not_given_to_yourdfpy() -> None:
-    found = second_reading("<!DOCTYPE robot>" + ARM, quiet_load(ARM).tree)
+    found = second_reading("<!DOCTYPE robot>" + ARM, loaded(ARM, verify=False).tree)
     assert found.unread == "the file has a document type"
 
 
 def test_the_declared_encoding_of_the_file_does_not_matter() -> None:
     assert reading(ARM.replace("turn", "drehen_ä")).differences == ()
     declared = '<?xml version="1.0" encoding="latin-1"?>' + ARM.replace("turn", "drehen_ä")
-    tree = quiet_load(ARM.replace("turn", "drehen_ä")).tree
+    tree = loaded(ARM.replace("turn", "drehen_ä"), verify=False).tree
     assert second_reading(declared, tree).differences == ()

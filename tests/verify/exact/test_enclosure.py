@@ -20,6 +20,7 @@ from tests.high_precision import mp, true_motion
 from tests.laws.everything import by_the_robot
 from tests.laws.subjects import robot_of, state
 from tests.laws.test_mutation import with_a_slip
+from tests.reading import present
 from urdfkin import BaseMotion, Reference
 from urdfkin.errors import InputError, NotFiniteError, UnknownNameError
 from urdfkin.kinematics.rotation import exp_rotation
@@ -219,8 +220,7 @@ def test_a_hessian_is_enclosed_where_it_is_asked_for(name: str) -> None:
     motion = true_motion(robot, x)
     assert robot.enclose(*x, robot.tip_frame).hessian is None
     for reference in Reference:
-        one = robot.enclose(*x, robot.tip_frame, reference, hessian=True).hessian
-        assert one is not None
+        one = present(robot.enclose(*x, robot.tip_frame, reference, hessian=True).hessian)
         assert holds(one, QUANTITIES["hessian"].truth(motion, link, reference))
         assert ((one.width <= 2.0 * np.spacing(np.abs(one.upper))) | (one.width < 1e-25)).mean() > 0.8
         assert one.error(robot.hessian(x[0], robot.tip_frame, reference)).max() < 1e-14
@@ -246,8 +246,7 @@ def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipl
 ) -> None:
     robot = urdfkin.load(FOLLOWERS)
     q, v, a = np.array([0.3]), np.array([1.0]), np.array([0.5])
-    one = robot.enclose(q, v, a, "d", reference, hessian=True).hessian
-    assert one is not None
+    one = present(robot.enclose(q, v, a, "d", reference, hessian=True).hessian)
     assert one.error(robot.hessian(q, "d", reference)).max() < 1e-14
     # The rate of the Jacobian by the robot's own recursion: with one rate, J-dot = H v.
     motion = true_motion(robot, (q, v, a))
