@@ -44,7 +44,7 @@ def body(name: str, place: str = "", inside: str = "", schemas: str = "") -> str
 
 def joint(
     name: str, kind: str, first: str, second: str, more: str = "", schemas: str = "", *,
-    axis: str = "", limits: Sequence[float] = (), **frames: object,
+    axis: str = "", limits: Sequence[object] = (), **frames: object,
 ) -> str:  # fmt: skip
     """Write a joint between two bodies of /arm; an empty name is the world; `localPos0=(x, y, z)`."""
     words = [f"rel physics:body{i} = </arm/{end}>" for i, end in enumerate((first, second)) if end]
@@ -149,8 +149,10 @@ def test_a_stage_with_y_up_is_turned_so_that_z_is_up(read: Read) -> None:
 
 def test_a_joint_frame_counts_on_both_sides(read: Read) -> None:
     turn = (0.70710677, 0, 0, 0.70710677)
-    frames = {"localPos0": (1, 0, 0), "localRot0": turn, "localPos1": (0, 3, 0), "localRot1": turn}
-    offset = joint("j", "Revolute", "base", "tip", axis="X", **frames)
+    offset = joint(
+        "j", "Revolute", "base", "tip", axis="X",
+        localPos0=(1, 0, 0), localRot0=turn, localPos1=(0, 3, 0), localRot1=turn,
+    )  # fmt: skip
     robot = read(body("base", schemas=ROOT) + body("tip", "(1, -3, 0)") + offset)
     assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([1.0, -3.0, 0.0])
     # the axis is the y axis of the base through (1, 0, 0)

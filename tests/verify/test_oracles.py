@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable
+from functools import reduce
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -290,53 +291,39 @@ def test_options_of_load_are_no_difference(how: dict[str, Any]) -> None:
     assert reading(ARM, **how).differences == ()
 
 
-def bend(joint: Any) -> None:
-    joint.axis = joint.axis + np.array([0.0, 1e-9, 0.0])
+def more(x: float, *at: int) -> Callable[[Any], Any]:
+    """Return the change of an array at one place."""
+
+    def changed(array: Any) -> Any:
+        array = array.copy()
+        array[at] += x
+        return array
+
+    return changed
 
 
-def shift(joint: Any) -> None:
-    joint.origin = joint.origin.copy()
-    joint.origin[0, 3] += 1e-12
-
-
-def tilt(joint: Any) -> None:
-    joint.origin = joint.origin.copy()
-    joint.origin[0, 0] += 1e-14
-
-
-def widen(joint: Any) -> None:
-    joint.limit.upper = 2.5
-
-
-def hang(joint: Any) -> None:
-    joint.parent = "c"
-
-
-def rename(joint: Any) -> None:
-    joint.name = "other"
-
-
-def change_kind(joint: Any) -> None:
-    joint.type = "continuous"
-
-
-PLANTED: dict[str, tuple[Callable[[Any], None], str]] = {
-    "axis": (bend, "joint turn: axis"),
-    "origin": (shift, "joint turn: origin"),
-    "rotation": (tilt, "joint turn: rotation"),
-    "limit": (widen, "joint turn: limit"),
-    "parent": (hang, "joint turn: from c to a"),
-    "name": (rename, "joint turn: 0 times, not 1"),
-    "kind": (change_kind, "joint turn: type continuous, not revolute"),
+#: Attribute of the joint that yourdfpy reads, its change, and the words about it.
+PLANTED: dict[str, tuple[str, Callable[[Any], Any], str]] = {
+    "axis": ("axis", more(1e-9, 1), "joint turn: axis"),
+    "origin": ("origin", more(1e-12, 0, 3), "joint turn: origin"),
+    "rotation": ("origin", more(1e-14, 0, 0), "joint turn: rotation"),
+    "limit": ("limit.upper", lambda _: 2.5, "joint turn: limit"),
+    "parent": ("parent", lambda _: "c", "joint turn: from c to a"),
+    "name": ("name", lambda _: "other", "joint turn: 0 times, not 1"),
+    "kind": ("type", lambda _: "continuous", "joint turn: type continuous, not revolute"),
 }
 
 
-def plant(monkeypatch: pytest.MonkeyPatch, fault: Callable[[Any], None], index: int = 0) -> None:
+def plant(
+    monkeypatch: pytest.MonkeyPatch, attribute: str, change: Callable[[Any], Any], index: int = 0
+) -> None:
     right = second_reader.read
 
     def wrong(text: str) -> Any:
         robot = right(text)
-        fault(robot.joints[index])
+        *owners, name = attribute.split(".")
+        owner = reduce(getattr, owners, robot.joints[index])
+        setattr(owner, name, change(getattr(owner, name)))
         return robot
 
     monkeypatch.setattr(second_reader, "read", wrong)
@@ -344,22 +331,19 @@ def plant(monkeypatch: pytest.MonkeyPatch, fault: Callable[[Any], None], index: 
 
 @pytest.mark.parametrize("what", PLANTED)
 def test_a_planted_difference_is_reported(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    fault, words = PLANTED[what]
-    plant(monkeypatch, fault)
+    *fault, words = PLANTED[what]
+    plant(monkeypatch, *fault)  # type: ignore[arg-type]
     assert any(words in text for text in reading(ARM).differences)
 
 
 def test_a_different_mimic_rule_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    def double(joint: Any) -> None:
-        joint.mimic.multiplier *= 2.0
-
-    plant(monkeypatch, double, 1)
+    plant(monkeypatch, "mimic.multiplier", lambda x: 2.0 * x, 1)
     (difference,) = reading(ARM).differences
     assert difference.startswith("joint slide: mimic rule")
 
 
 def test_a_bent_axis_fails_the_validation(monkeypatch: pytest.MonkeyPatch) -> None:
-    plant(monkeypatch, bend)
+    plant(monkeypatch, *PLANTED["axis"][:2])
     report = validate(ARM, samples=0)
     (robot,) = report.robots
     assert robot.verdict is Verdict.DISAGREES
