@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.cli.test_dh import run
+from tests.dh.arms import with_cell
 from urdfkin.dh import DHTable, read_table, table_from_rows, units_of
 from urdfkin.dh.compare import Comparison, compare, document
 from urdfkin.dh.convert import to_tree
@@ -28,12 +29,6 @@ AS_WRITTEN = ("panda", "ur5", pytest.param("xarm7_standard", marks=pytest.mark.l
 def shipped(name: str) -> tuple[FrameChain, DHTable]:
     table = read_table(reference_path(name))
     return load(table.robot).chain(table.tip_frame, table.base_frame), table
-
-
-def with_cell(table: DHTable, row: int, cell: str, value: float) -> DHTable:
-    rows = list(table.rows)
-    rows[row] = replace(rows[row], **{cell: value})  # type: ignore[arg-type]
-    return replace(table, rows=tuple(rows))
 
 
 def with_wrong_signs(table: DHTable) -> Iterator[tuple[int, str, DHTable]]:
