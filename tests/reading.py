@@ -1,22 +1,18 @@
-"""What tests read: robots whatever is found in them, records and trees of texts, and modules of files."""
+"""What tests read: records and trees of texts, modules of files, and values that must not be None."""
 
 from __future__ import annotations
 
 import importlib.util
-import warnings
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import TypeVar
 
-import urdfkin
 from urdfkin.model.tree import KinematicTree
-from urdfkin.robot import Robot
 from urdfkin.urdf.findings import Reporter
 from urdfkin.urdf.lint import UrdfError
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.records import RobotRecord
-from urdfkin.urdf.writer import to_urdf
 
 T = TypeVar("T")
 
@@ -25,16 +21,6 @@ def present(value: T | None) -> T:
     """Return a value that must not be None."""
     assert value is not None
     return value
-
-
-def loaded(source: Any, **options: Any) -> Robot:
-    """Load a robot or a tree, and ignore the warnings about it."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        robot: Robot = urdfkin.load(
-            to_urdf(source) if isinstance(source, KinematicTree) else source, **options
-        )
-        return robot
 
 
 def module_of(path: Path) -> ModuleType:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.reading import loaded, tree_of
+from tests.reading import tree_of
+from tests.urdfs import loaded
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.verifier import NotVerifiedWarning

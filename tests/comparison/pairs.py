@@ -9,13 +9,13 @@ from functools import cache, partial, reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tests import reading
+from tests import urdfs
 from urdfkin.kinematics.rotation import exp_rotation, rotation_from_rpy, rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, inverse
 from urdfkin.robot import Robot
 
 #: Load a robot or a tree, unverified.
-loaded = partial(reading.loaded, verify=False)
+loaded = partial(urdfs.loaded, verify=False)
 Change = Callable[[KinematicTree], KinematicTree]
 Branch = tuple[Joint, str, str]
 

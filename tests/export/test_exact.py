@@ -23,7 +23,8 @@ from tests.counted import Counted, Matrix, all_conspiring, deviation, eq
 from tests.export.writing import ALL, code
 from tests.kinematics.test_roundings import PARTS, most, of_sines, theirs, turn
 from tests.laws.subjects import robot_of
-from tests.reading import loaded, present
+from tests.reading import present
+from tests.urdfs import loaded
 from urdfkin.export import exact as exact_module
 from urdfkin.export import recursion, write
 from urdfkin.export.c import framed

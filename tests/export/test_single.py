@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 import urdfkin
 from tests.export.writing import code, file
 from tests.laws.subjects import robot_of, state
-from tests.reading import loaded, module_of
+from tests.reading import module_of
+from tests.urdfs import loaded
 from urdfkin.export import proof, single
 from urdfkin.export.expression import Graph, Node
 from urdfkin.export.function import Function

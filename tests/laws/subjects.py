@@ -3,9 +3,9 @@
 import numpy as np
 import pinocchio as pin
 
-from tests.reading import loaded
 from tests.robots.against_pinocchio import coupling, model_of
 from tests.robots.odd_urdfs import urdf_of
+from tests.urdfs import loaded
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 import urdfkin
 from tests.laws.everything import by_the_robot, differing, on_its_way_alone, prepared
 from tests.laws.subjects import NAMES, robot_of, state
-from tests.reading import loaded
 from tests.robots.odd_urdfs import Urdf
+from tests.urdfs import loaded
 from urdfkin import load
 from urdfkin.compiled.evaluate import PART
 from urdfkin.compiled.plan import LANES

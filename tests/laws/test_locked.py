@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.laws.subjects import robot_of, state
-from tests.reading import loaded, present
+from tests.reading import present
 from tests.strategies import trees
+from tests.urdfs import loaded
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.errors import OracleError
 from urdfkin.kinematics.rotation import rotation_from_rpy

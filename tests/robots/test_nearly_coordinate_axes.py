@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import urdfkin
-from tests.reading import loaded
+from tests.urdfs import loaded
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree, freed, with_tilts
 from urdfkin.robot import Robot

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
-from tests.reading import loaded
 from tests.robots.against_pinocchio import ask
 from tests.robots.odd_urdfs import NAMES, random_tree, urdf_of
+from tests.urdfs import loaded
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot

@@ -17,8 +17,8 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as command
-from tests.reading import loaded
 from tests.urdf.lint.cases.arm import arm
+from tests.urdfs import loaded
 from urdfkin.errors import InputError, OracleError
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.system.processes import ask_python

@@ -17,7 +17,8 @@ pytest.importorskip("pxr")
 
 import urdfkin
 from tests.cli.running import urdfkin as command
-from tests.reading import loaded, present
+from tests.reading import present
+from tests.urdfs import loaded
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Question
 from urdfkin.errors import InputError, OracleError, SourceError

@@ -16,8 +16,8 @@ import pytest
 import urdfkin
 from scripts.fuzzing import robots
 from tests.cli.running import Done, process
-from tests.reading import loaded
 from tests.urdf.lint.cases.arm import arm, fixed
+from tests.urdfs import loaded
 from urdfkin.errors import InstallationError, UnknownNameError
 from urdfkin.model.reference import Reference
 from urdfkin.urdf.catalogue import catalogue
