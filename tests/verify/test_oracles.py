@@ -15,9 +15,10 @@ import pytest
 
 import urdfkin
 from scripts.fuzzing import robots
+from tests import urdfs
 from tests.cli.running import Done, process
 from tests.urdf.lint.cases.arm import arm, fixed
-from tests.urdfs import loaded
+from tests.urdfs import joint, loaded, mimic
 from urdfkin.errors import InstallationError, UnknownNameError
 from urdfkin.model.reference import Reference
 from urdfkin.urdf.catalogue import catalogue
@@ -253,15 +254,13 @@ def test_an_oracle_that_is_not_installed_says_what_to_install(monkeypatch: pytes
 # -- yourdfpy reads each URDF a second time, and a different tree is reported --------------------------------
 
 
-ARM = """<robot name="arm">
-<link name="base"/><link name="a"/><link name="b"/><link name="c"/>
-<joint name="turn" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
-  <origin xyz="0.1 0.2 0.3" rpy="0.1 -0.2 2.5"/><limit lower="-1" upper="2" effort="3" velocity="4"/></joint>
-<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/>
-  <limit lower="-1" upper="2" effort="3" velocity="4"/>
-  <mimic joint="turn" multiplier="0.5" offset="0.25"/></joint>
-<joint name="tool" type="fixed"><parent link="b"/><child link="c"/></joint>
-</robot>"""
+_ENDS = '<limit lower="-1" upper="2" effort="3" velocity="4"/>'
+ARM = urdfs.robot(
+    joint("turn", "revolute", "base", "a", 'xyz="0.1 0.2 0.3" rpy="0.1 -0.2 2.5"', more=_ENDS),
+    joint("slide", "prismatic", "a", "b", axis="1 0 0", more=_ENDS + mimic("turn", 0.5, 0.25)),
+    joint("tool", "fixed", "b", "c", axis=""),
+    name="arm",
+)
 
 
 def reading(text: str, **how: Any) -> SecondReading:
