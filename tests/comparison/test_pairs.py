@@ -13,10 +13,12 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
 from tests.dh.test_compare import disguised, elbow
 from tests.reading import present
+from tests.urdfs import joint, limit, mimic
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.dh import dh_table
@@ -163,12 +165,11 @@ def test_standard_and_modified_rows_of_one_robot_are_the_same() -> None:
 
 
 #: A joint that follows another one; multiplier and offset are to be filled in.
-FOLLOWING = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="k" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="j" multiplier="{}" offset="{}"/></joint>
-<joint name="e" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0"/></joint></robot>"""
+FOLLOWING = urdfs.robot(
+    joint("j", "revolute", "a", "b", more=limit()),
+    joint("k", "revolute", "b", "c", 'xyz="0.3 0 0"', more=limit() + mimic("j", "{}", "{}")),
+    joint("e", "fixed", "c", "d", 'xyz="0.3 0 0"', axis=""),
+)
 
 
 def test_a_rule_that_differs_by_less_than_the_rounding_of_the_zeros_is_no_difference() -> None:

@@ -18,11 +18,13 @@ import pytest
 from flint import arb
 
 import urdfkin
+from tests import urdfs
 from tests.cli.running import urdfkin as command
 from tests.export.writing import ALL, built, code, file, need, ran
 from tests.high_precision import mp, true_motion
 from tests.laws.subjects import robot_of, state
 from tests.reading import module_of
+from tests.urdfs import joint, limit, mimic
 from urdfkin.dh import export
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import LANGUAGES, write
@@ -431,13 +433,11 @@ def _torch(gradcheck: Callable[..., bool]) -> ModuleType:
     return made
 
 
-_GEARED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="end" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0.5 0 0.2"/></joint>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
-<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
-<joint name="k" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
-<origin xyz="1 0 0"/><mimic joint="j" multiplier="{}"/>
-<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+_GEARED = urdfs.robot(
+    joint("end", "fixed", "c", "d", 'xyz="0.5 0 0.2"', axis=""),
+    joint("j", "revolute", "a", "b", more=limit(-2, 2)),
+    joint("k", "revolute", "b", "c", 'xyz="1 0 0"', "0 1 0", mimic("j", "{}") + limit(-1e9, 1e9)),
+)
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")

@@ -13,10 +13,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import urdfkin
+from tests import urdfs
 from tests.export.writing import code, file
 from tests.laws.subjects import robot_of, state
 from tests.reading import module_of
-from tests.urdfs import loaded
+from tests.urdfs import joint, limit, loaded, mimic
 from urdfkin.export import proof, single
 from urdfkin.export.expression import Graph, Node
 from urdfkin.export.function import Function
@@ -167,8 +168,7 @@ def test_a_number_beyond_the_largest_has_no_bound() -> None:
 
 # -- in files -----------------------------------------------------------------------------------------------
 
-_FIXED = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>
-<child link="b"/><origin xyz="{}" rpy="{}"/></joint></robot>"""
+_FIXED = urdfs.robot(joint("j", "fixed", "a", "b", 'xyz="{}" rpy="{}"', axis=""))
 
 
 def shares(text: str, folder: Path) -> dict[tuple[str, str], float]:
@@ -201,12 +201,13 @@ def shares_of(robot: urdfkin.Robot, quantities: tuple[str, ...], folder: Path, f
     return max(float(share) for (_, kind), share in own.check().items() if kind == "float64")
 
 
-_TURNED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin rpy="{angle} {angle} 0.1"/>
-<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
-<joint name="k" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
-<origin xyz="1 0 0"/><mimic joint="j" multiplier="{multiplier}" offset="{offset}"/>
-<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+_TURNED = urdfs.robot(
+    joint("j", "revolute", "a", "b", 'rpy="{angle} {angle} 0.1"', more=limit(-2, 2)),
+    joint(
+        "k", "revolute", "b", "c", 'xyz="1 0 0"', "0 1 0",
+        mimic("j", "{multiplier}", "{offset}") + limit(-1e9, 1e9),
+    ),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", range(1, 4))
@@ -226,15 +227,11 @@ def test_a_file_of_large_angles_and_rules_needs_the_rounding_of_their_decimals(
     assert shares_of(held, ("placement",), tmp_path, "c") > 1.0
 
 
-_CANCELLED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
-<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
-<joint name="k" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
-<mimic joint="i" multiplier="-37.123" offset="{offset}"/>
-<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint>
-<joint name="i" type="prismatic"><parent link="a"/><child link="d"/><axis xyz="0 0 1"/>
-<mimic joint="j" multiplier="0.001" offset="{before}"/>
-<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+_CANCELLED = urdfs.robot(
+    joint("j", "revolute", "a", "b", axis="0 1 0", more=limit(-2, 2)),
+    joint("k", "prismatic", "b", "c", more=mimic("i", -37.123, "{offset}") + limit(-1e9, 1e9)),
+    joint("i", "prismatic", "a", "d", more=mimic("j", 0.001, "{before}") + limit(-1e9, 1e9)),
+)
 
 
 @pytest.mark.parametrize("before", ["6732.655", "589262.492", "58731509.822"])
