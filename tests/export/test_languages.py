@@ -306,7 +306,7 @@ def test_numpys_functions_refuse_a_wrong_length_and_convert_whole_numbers(tmp_pa
     ],
 )
 def test_numpys_functions_refuse_numbers_that_are_not_real(wrong: Any, found: str, tmp_path: Path) -> None:
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numpy", tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numpy", tmp_path))
     with pytest.raises(TypeError, match=rf"q needs real numbers: found {found}$"):
         own.velocity(wrong, [0.0, 0.0])
     with pytest.raises(TypeError, match=rf"v needs real numbers: found {found}$"):
@@ -316,7 +316,7 @@ def test_numpys_functions_refuse_numbers_that_are_not_real(wrong: Any, found: st
 @pytest.mark.parametrize("to", ["numpy", "array"])
 def test_nan_in_an_input_reaches_every_result_that_depends_on_it(to: str, tmp_path: Path) -> None:
     robot = robot_of("planar_and_floating_in_the_middle")
-    own = module(file(code(robot, quantities=_THREE), to, tmp_path))
+    own = module_of(file(code(robot, quantities=_THREE), to, tmp_path))
     for name, given in zip(_THREE, (1, 1, 3), strict=True):
         function, inputs = getattr(own, name), [x[0] for x in state(robot, 1, 4)][:given]
         right = function(*inputs)
@@ -336,7 +336,7 @@ def test_functions_of_any_array_refuse_what_is_no_array(
 ) -> None:
     if not installed:
         monkeypatch.setitem(sys.modules, "array_api_compat", None)
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "array", tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "array", tmp_path))
     right = np.zeros(2)
     for wrong, found in (([0.0, 0.0], "list"), ("ab", "str"), (None, "NoneType")):
         with pytest.raises(
@@ -350,7 +350,7 @@ def test_functions_of_any_array_refuse_what_is_no_array(
 def test_functions_of_casadi_refuse_a_wrong_length(tmp_path: Path) -> None:
     casadi: Any = pytest.importorskip("casadi")
     written = file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "casadi", tmp_path)
-    own = module(written)
+    own = module_of(written)
     for kind in (casadi.SX, casadi.MX):
         for right in (kind.sym("q", 2), kind.sym("q", 1, 2), [0.0, kind.sym("q")], np.zeros(2)):
             assert own.velocity(right, [0.0, 1.0]).shape == (6, 1)
@@ -368,7 +368,7 @@ def test_functions_of_casadi_refuse_a_wrong_length(tmp_path: Path) -> None:
 @pytest.mark.parametrize("to", ["sympy", "sympy-exact"])
 def test_functions_of_sympy_refuse_a_wrong_length(to: str, tmp_path: Path) -> None:
     sympy: Any = pytest.importorskip("sympy")
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), to, tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), to, tmp_path))
     right = sympy.symbols("q:2")
     assert own.velocity(right, sympy.Matrix(right)).shape == (6, 1)
     for wrong in (sympy.symbols("q:3"), [0]):
@@ -511,7 +511,7 @@ def test_functions_of_pytorch_refuse_what_is_no_tensor_of_floating_numbers(
         torch: Any = importlib.import_module("torch")
     except ModuleNotFoundError:
         monkeypatch.setitem(sys.modules, "torch", torch := _torch(lambda *_, **__: True))
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "torch", tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "torch", tmp_path))
     right = torch.tensor([0.0, 1.0], dtype=torch.float64)
     assert own.velocity(right, right).shape == (6,)
     for wrong, error, found in (
