@@ -1,4 +1,11 @@
-"""A text read as `urdfkin.load` reads it, whatever is found in it."""
+"""What tests read: records and trees of texts, modules of files, and values that must not be None."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+from typing import TypeVar
 
 from urdfkin.model.tree import KinematicTree
 from urdfkin.urdf.findings import Reporter
@@ -6,6 +13,22 @@ from urdfkin.urdf.lint import UrdfError
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.records import RobotRecord
+
+T = TypeVar("T")
+
+
+def present(value: T | None) -> T:
+    """Return a value that must not be None."""
+    assert value is not None
+    return value
+
+
+def module_of(path: Path) -> ModuleType:
+    """Import a file."""
+    spec = present(importlib.util.spec_from_file_location(path.stem, path))
+    found = importlib.util.module_from_spec(spec)
+    present(spec.loader).exec_module(found)
+    return found
 
 
 def records(data: bytes) -> RobotRecord:

@@ -18,6 +18,7 @@ from scripts.benchmarking.operations import operations
 from scripts.pages import inserted
 from tests.cli.running import urdfkin as run
 from tests.pages import pages
+from tests.reading import present
 from urdfkin.cli import cli
 from urdfkin.verify.quantities import QUANTITIES, compared, not_compared
 
@@ -125,8 +126,9 @@ def plain(text: str) -> str:
 
 
 def test_what_a_validation_compares_is_said_as_the_table_of_quantities_has_it() -> None:
-    validate = cli.get_command(cli.make_context("urdfkin", ["--help"], resilient_parsing=True), "validate")
-    assert validate is not None
+    validate = present(
+        cli.get_command(cli.make_context("urdfkin", ["--help"], resilient_parsing=True), "validate")
+    )
     assert validate.help is not None
     template = (ROOT / "urdfkin/report/templates/report.html.j2").read_text("utf-8")
     assert "{{ compared }}" in template

@@ -1,13 +1,13 @@
 """What would kill the process is not asked of Pinocchio, and the result says that it was not checked."""
 
 import threading
-import warnings
 
 import numpy as np
 import pytest
 
 import urdfkin
 from tests.reading import tree_of
+from tests.urdfs import loaded
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.verifier import NotVerifiedWarning
@@ -63,9 +63,7 @@ def test_validate_reports_what_cannot_be_verified() -> None:
 def test_a_file_whose_own_root_is_called_universe_is_verified(kind: JointKind) -> None:
     """The names are those of a hung robot, but nobody hung it."""
     text = to_urdf(with_root_joint(chain(2), kind))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        robot = urdfkin.load(text)
+    robot = loaded(text)
     robot.placement(robot.sample(2, seed=0), "l2")
     assert robot.certificate().verified
     assert tree_of(text.encode()).links[0] == "universe"

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
 from tests.cli.running import urdfkin as command
 from tests.robots.odd_urdfs import urdf_of
+from tests.urdfs import joint
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.kinematics import roundings
 from urdfkin.kinematics.rotation import exp_rotation
@@ -167,10 +169,7 @@ def test_a_call_may_ask_for_the_check_that_the_robot_leaves_out() -> None:
 def test_what_pinocchio_cannot_check_is_handed_out_with_a_warning_and_never_as_verified(
     name: str, limit: str, reason: str
 ) -> None:
-    text = (
-        f'<robot name="r"><link name="a"/><link name="b"/><joint name="{name}" type="revolute">'
-        f'<parent link="a"/><child link="b"/>{limit}</joint></robot>'
-    )
+    text = urdfs.robot(joint(name, "revolute", "a", "b", axis="", more=limit))
     with pytest.warns(urdfkin.UrdfWarning):
         robot = urdfkin.load(text)
     with pytest.warns(urdfkin.NotVerifiedWarning, match=f"not verified: Pinocchio {reason}"):
@@ -375,20 +374,16 @@ def test_the_oracle_keeps_out_of_what_would_end_the_process() -> None:
 def snake(links: int, *, fixed: bool) -> str:
     """A chain whose first joint moves, and whose others do unless they are fixed."""
     kinds = ["continuous"] + ["fixed" if fixed else "continuous"] * (links - 1)
-    joints = "".join(
-        f'<link name="l{i + 1}"/><joint name="j{i}" type="{kind}"><parent link="l{i}"/>'
-        f'<child link="l{i + 1}"/><origin xyz="0.01 0 0"/><axis xyz="0 0 1"/></joint>'
-        for i, kind in enumerate(kinds)
-    )
-    return f'<robot name="snake"><link name="l0"/>{joints}</robot>'
+    joints = (joint(f"j{i}", k, f"l{i}", f"l{i + 1}", 'xyz="0.01 0 0"') for i, k in enumerate(kinds))
+    return urdfs.robot(*joints, name="snake")
 
 
 def test_the_oracle_reads_names_and_layout_from_the_tree_and_nothing_else(panda: Robot) -> None:
     # Whatever the tree says of places, axes and limits, the answer is the text's.
     other = urdfkin.load("panda")
-    for joint in other.tree.joints:
-        object.__setattr__(joint, "T_parent_joint", np.eye(4))
-        object.__setattr__(joint, "axis", np.array([1.0, 0.0, 0.0]))
+    for each in other.tree.joints:
+        object.__setattr__(each, "T_parent_joint", np.eye(4))
+        object.__setattr__(each, "axis", np.array([1.0, 0.0, 0.0]))
     x = QueryBatch(["panda_hand", "panda_rightfinger"], (panda.sample(3, 2),))
     one, two = (PinocchioOracle(panda.urdf, robot.tree).placements(x) for robot in (panda, other))
     assert (one == two).all()

@@ -1,9 +1,10 @@
-"""Where somebody starts who has never seen urdfkin: to the first numbers and the first answer."""
+"""Where somebody starts: the README, the page Start, the first five minutes and the tour."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,9 +13,11 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.pages import DOCS, blocks
+from urdfkin.cli import commands
 from urdfkin.cli.explain import anchor, answers
 
-README = (DOCS.parent / "README.md").read_text("utf-8")
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text("utf-8")
 #: The robot of the page "Start", whose file they have.
 OWN = re.search(r'"""(<robot.*?</robot>)"""', blocks("index.md")[1][1], re.DOTALL)
 POSE = np.radians([30.0, 90.0])  # Pinocchio's order: the shoulder first, as it is a chain
@@ -70,3 +73,169 @@ def test_why_their_pinocchio_numbers_differ_is_the_first_answer_and_its_example_
     for _, code in kinds[:2]:
         exec(code.replace("print(", "agrees = ("), names)
     assert names["agrees"] == (True, True)
+
+
+# -- the README is true: its example runs, its commands exist, its transcripts are the real output -----------
+
+
+def block(language: str, page: str = README) -> str:
+    """The first fenced block of a language."""
+    blocks: list[str] = re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
+    return blocks[0]
+
+
+def transcripts() -> list[tuple[list[str], list[str]]]:
+    """Each command of the console blocks, as words, and the lines it prints."""
+    found: list[tuple[list[str], list[str]]] = []
+    for text in re.findall(r"```console\n(.*?)```", README, re.DOTALL):
+        for line in text.splitlines():
+            if line.startswith("$ urdfkin "):
+                found.append((line.split()[2:], []))
+            else:
+                found[-1][1].append(line)
+    return found
+
+
+def masked(text: str) -> str:
+    """A text without the disagreements, which differ between machines."""
+    return re.sub(
+        r"worst (error |disagreement )?\S+|\S+% of|Pinocchio \S+|\d\S* of the bound", "", text
+    ).strip()
+
+
+def test_the_smallest_example_runs_and_is_verified() -> None:
+    names: dict[str, Any] = {}
+    exec(compile(block("python"), "README.md", "exec"), names)
+    assert names["J"].shape == (1000, 6, 8)
+    assert names["robot"].certificate().verified
+    assert masked(str(names["robot"].certificate())) == masked(block("text"))
+
+
+def test_the_page_of_conventions_has_fast_calls_that_run() -> None:
+    page = (ROOT / "docs" / "conventions-used.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    exec(compile(block("python", page), "docs/conventions-used.md", "exec"), names)
+    (line,) = names["robot"].certificate().lines
+    assert (line.quantity, line.checked, line.unchecked) == ("jacobian", 203, 1901)
+
+
+def test_every_command_has_a_row_on_the_page_of_commands() -> None:
+    page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([a-z-]+)", page, re.MULTILINE)
+    assert list(dict.fromkeys(rows)) == list(commands())
+
+
+def test_the_front_page_names_a_command_for_each_of_its_four_people() -> None:
+    shown = [words[0] for words, _ in transcripts()]
+    assert shown == ["dh", "acceleration", "check", "export", "export"]
+
+
+@pytest.mark.slow
+def test_each_transcript_is_the_real_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    for words, expected in transcripts():
+        for option in ("-o", "--check"):
+            if option in words:
+                words[words.index(option) + 1] = str(tmp_path / words[words.index(option) + 1])
+        done = run(*words)
+        printed = [masked(line) for line in (done.text + done.err).splitlines()]
+        wanted = [masked(line) for line in expected if line != "..."]
+        assert printed[: len(wanted)] == wanted, words
+        assert len(printed) == len(wanted) or expected[-1] == "...", words
+
+
+# -- the first five minutes: one's own robot's Jacobian, its table, and why Pinocchio's numbers differ -------
+
+
+#: Somebody's own: joints are not in alphabetical order, a wheel turns without end.
+MINE = (
+    '<robot name="mine"><link name="floor"/><link name="column"/><link name="upper"/><link name="tool"/>'
+    '<joint name="turntable" type="continuous"><parent link="floor"/><child link="column"/>'
+    '<axis xyz="0 0 1"/></joint>'
+    '<joint name="shoulder" type="revolute"><parent link="column"/><child link="upper"/>'
+    '<origin xyz="0 0 0.4"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="9" velocity="3"/></joint>'
+    '<joint name="elbow" type="revolute"><parent link="upper"/><child link="tool"/>'
+    '<origin xyz="0.3 0 0"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="9" velocity="3"/></joint>'
+    "</robot>"
+)
+POSE_BY_NAME = "turntable=90deg, shoulder=-30deg, elbow=45deg"
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.urdf"
+    path.write_text(MINE)
+    return path
+
+
+def test_minute_one_the_jacobian_at_a_pose_in_degrees_by_joint_names(mine: Path) -> None:
+    done = run("jacobian", str(mine), "--q", POSE_BY_NAME)
+    assert done.code == 0
+    assert all(name in done.text for name in ("jacobian of tool", "turntable", "shoulder", "elbow"))
+    assert "verified by Pinocchio" in done.text
+    data = run("jacobian", str(mine), "--q", POSE_BY_NAME, "--format", "json").data
+    model = pin.buildModelFromUrdf(str(mine))
+    q = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), np.radians(-30), np.radians(45)])
+    frame = model.getFrameId("tool")
+    J = pin.computeFrameJacobian(model, model.createData(), q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+    np.testing.assert_allclose(data["result"][0], J, atol=1e-15)
+
+
+def test_minute_three_the_table_in_a_notebook(mine: Path) -> None:
+    robot = urdfkin.load(mine)
+    table = robot.dh()
+    cell = table._repr_html_()
+    assert "standard Denavit-Hartenberg parameters" in cell
+    assert all("<td" in cell and joint in cell for joint in ("turntable", "shoulder", "elbow"))
+    np.testing.assert_allclose(
+        table.placement(POSE_BY_NAME), robot.placement(POSE_BY_NAME, "tool"), atol=1e-15
+    )
+
+
+def test_minute_five_why_pinocchios_numbers_differ(mine: Path) -> None:
+    robot = urdfkin.load(mine)
+    q = pin.neutral(pin.buildModelFromUrdf(str(mine)))
+    with pytest.raises(
+        urdfkin.InputError, match=r"Pinocchio's q has that length: robot.from_pinocchio\(q\)"
+    ) as why:
+        robot.jacobian(q)
+    assert "turntable, shoulder, elbow" in str(why.value)
+    np.testing.assert_array_equal(robot.from_pinocchio(q), robot.neutral())
+    page = (Path(__file__).parents[1] / "docs" / "conventions-used.md").read_text(encoding="utf-8")
+    for answer in (
+        "LOCAL_WORLD_ALIGNED",
+        "classical one",
+        "[linear; angular]",
+        "from_pinocchio",
+        "not the order of the file",
+    ):
+        assert answer in page
+
+
+# -- docs/tour.md runs, prints what it says, and has its pictures --------------------------------------------
+
+
+TOUR = (DOCS / "tour.md").read_text(encoding="utf-8")
+
+
+def test_every_picture_is_there_and_described() -> None:
+    pictures = re.findall(r"!\[(.+?)\]\((.+?)\)", TOUR)
+    assert len(pictures) >= 8
+    for described, file in pictures:
+        assert len(described) > 20
+        assert (DOCS / file).read_text(encoding="utf-8").lstrip().startswith("<?xml")
+
+
+def test_every_section_of_the_chapter_has_its_place() -> None:
+    for section in ("7.1", "7.2", "7.3", "7.4", "7.5", "7.6", "7.7"):
+        assert re.search(rf"^## .*{re.escape(section)}\b", TOUR, re.MULTILINE), section
+
+
+@pytest.mark.slow
+def test_the_pictures_can_be_drawn_again(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    from scripts import make_tour  # noqa: PLC0415  needs the extra
+
+    make_tour.main(tmp_path)
+    drawn = {path.name for path in tmp_path.iterdir()}
+    assert drawn == {Path(file).name for _, file in re.findall(r"!\[(.+?)\]\((.+?)\)", TOUR)}

@@ -9,7 +9,9 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import urdfkin
+from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
+from urdfkin.urdf.writer import to_urdf
 
 
 def limit(lower: object = -1, upper: object = 1) -> str:
@@ -49,8 +51,8 @@ def chain(
     return robot(*parts, **how)
 
 
-def loaded(text: str, **how: Any) -> Robot:
-    """The robot of a text whose warnings are no matter."""
+def loaded(source: Any, **how: Any) -> Robot:
+    """The robot of a text, or of another source or a tree, whose warnings are no matter."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(text, **how)
+        return urdfkin.load(to_urdf(source) if isinstance(source, KinematicTree) else source, **how)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from tests.calibration.arms import BRANCHED, pose
 from tests.cli.running import urdfkin
+from tests.reading import present
 from urdfkin.calibration.calibrate import read_poses
 from urdfkin.calibration.universal_robots import (
     LINKS,
@@ -228,8 +229,7 @@ def test_the_drivers_angles_turn_about_x_y_and_z_in_that_order_and_a_urdfs_do_no
 def test_the_ros_descriptions_urdf_gets_the_files_numbers(prefix: str, file: Path) -> None:
     robot = load(description(prefix))
     found = universal_robots(robot, file, "urdf")
-    assert found.certificate is not None
-    assert found.certificate.verified
+    assert present(found.certificate).verified
     written = load(found.text)
     for (link, joint), T in zip(LINKS.items(), drawn_in(), strict=True):
         here = written.tree.joints[written.tree.joint_index(prefix + joint)].T_parent_joint
@@ -344,8 +344,7 @@ def test_a_quaternion_stays_a_quaternion() -> None:
     new = with_origins(text.encode(), {"four": drawn @ pose(3, 0.1)})
     assert np.abs(origins(new)["four"] - drawn @ pose(3, 0.1)).max() < 1e-14
     assert b"rpy" not in next(line for line in new.splitlines() if b"quat_xyzw" in line)
-    written = re.search(rb'quat_xyzw="([^"]*)"', new)
-    assert written is not None
+    written = present(re.search(rb'quat_xyzw="([^"]*)"', new))
     assert np.dot([float(x) for x in written[1].split()], [0, 0, -0.6, -0.8]) > 0.0
 
 

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from tests.calibration.arms import BRANCHED, Bench, bench, pose
 from tests.calibration.test_way import table
+from tests.reading import present
 from urdfkin.calibration.calibrate import Calibration, calibrate, doubts
 from urdfkin.calibration.fit import stacked
 from urdfkin.calibration.parameters import table_model
@@ -42,8 +43,7 @@ def test_without_noise_the_true_arm_is_found_to_rounding(
     assert found.fitted is not None
     away = elsewhere(true, found.fitted.at) - elsewhere(true, true.truth)
     assert np.abs(away[:, :3, 3] if not complete else away).max() < 1e-13
-    assert found.certificate is not None
-    assert found.certificate.verified
+    assert present(found.certificate).verified
     written = load(found.written.text, verify=False)
     q = true.robot.sample(20, 99)
     T = np.linalg.solve(written.placement(q, base), written.placement(q, tip))
@@ -59,8 +59,7 @@ def test_the_instrument_and_its_target_may_be_anywhere(complete: bool) -> None:
     poses = T if complete else T[:, :3, 3]
     tip, base = "panda_hand", "panda_link0"
     found = calibrate(true.robot, true.q, poses, tip=tip, base=base, fit=[*ENDS, "origins"])
-    assert found.fitted is not None
-    assert found.fitted.rms()[0] < 1e-13
+    assert present(found.fitted).rms()[0] < 1e-13
     rough = calibrate(true.robot, true.q, poses, tip=tip, base=base, fit=ENDS)
     assert rough.base is not None
     assert rough.tool is not None
@@ -74,8 +73,7 @@ def test_joints_that_are_called_as_the_ends_are_no_ends() -> None:
     true = bench(text, ("origins",), "hand", "trunk")
     B, X = pose(1, 4.0), pose(2, 0.3)
     found = calibrate(true.robot, true.q, B @ true.T @ X, tip="hand", base="trunk", fit=[*ENDS, "origins"])
-    assert found.fitted is not None
-    assert found.fitted.rms()[0] < 1e-13
+    assert present(found.fitted).rms()[0] < 1e-13
     assert set(found.origins) <= {"base", "tool", "fix"}
     assert found.base is not None
     assert np.abs(found.base - B).max() < 0.05
@@ -107,8 +105,7 @@ def test_a_tables_cells_are_found_with_a_fifth_where_axes_are_parallel(conventio
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
     found = calibrate(drawn, q, model.way.poses(q, truth))
     assert found.table is not None
-    assert found.fitted is not None
-    assert found.fitted.rms()[0] < 1e-14
+    assert present(found.fitted).rms()[0] < 1e-14
     np.testing.assert_allclose(found.table.placement(q), model.way.poses(q, truth), atol=1e-13)
     assert found.table.convention is convention
     assert max(abs(row.d) for row in found.table.rows) < 0.5

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from functools import cache, partial, reduce
@@ -10,12 +9,13 @@ from functools import cache, partial, reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-import urdfkin
+from tests import urdfs
 from urdfkin.kinematics.rotation import exp_rotation, rotation_from_rpy, rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, Mimic, build_tree, inverse
 from urdfkin.robot import Robot
-from urdfkin.urdf.writer import to_urdf
 
+#: Load a robot or a tree, unverified.
+loaded = partial(urdfs.loaded, verify=False)
 Change = Callable[[KinematicTree], KinematicTree]
 Branch = tuple[Joint, str, str]
 
@@ -338,17 +338,7 @@ UNLIKE: dict[str, Change] = {
 @cache
 def robot(name: str) -> Robot:
     """A robot of the catalogue, unverified, with limits that a URDF can hold."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        tree = urdfkin.load(name, verify=False).tree
-        return urdfkin.load(to_urdf(bounded(tree)), verify=False)
-
-
-def loaded(tree: KinematicTree) -> Robot:
-    """The robot of a tree, unverified."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(to_urdf(tree), verify=False)
+    return loaded(bounded(loaded(name).tree))
 
 
 def changed(name: str, what: str) -> Robot | None:
@@ -356,7 +346,5 @@ def changed(name: str, what: str) -> Robot | None:
     change = (ALIKE | UNLIKE)[what]
     if what in UNLIKE and not moving(robot(name).tree):
         return None
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        tree = change(robot(name).tree)
-        return None if tree is robot(name).tree else urdfkin.load(to_urdf(tree), verify=False)
+    tree = change(robot(name).tree)
+    return None if tree is robot(name).tree else loaded(tree)

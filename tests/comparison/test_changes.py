@@ -8,6 +8,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as run
+from tests.reading import present
 from urdfkin.comparison.diff import Change
 from urdfkin.report.diff import markdown_of
 
@@ -52,8 +53,7 @@ def test_a_joints_effect_is_its_own_and_the_total_is_of_all() -> None:
     assert effect.interval.lower == pytest.approx(0.025, rel=1e-9)
     # What is moved and not turned is as far off everywhere: the bound is the length itself.
     assert effect.interval.lower <= effect.interval.upper == pytest.approx(0.025, rel=1e-9)
-    assert found.total is not None
-    assert found.total.lower == pytest.approx(0.025, rel=1e-9)
+    assert present(found.total).lower == pytest.approx(0.025, rel=1e-9)
 
 
 def test_two_changes_that_undo_each_other_move_less_together() -> None:
@@ -62,8 +62,9 @@ def test_two_changes_that_undo_each_other_move_less_together() -> None:
     bent = bent.replace('xyz="0.3 0 0"', 'xyz="0.3 0 0" rpy="0 0 -0.5"')
     found = urdfkin.diff(three, bent)
     assert str(found.effects[1]).startswith("alone turns tip by up to 500 mrad")
-    assert found.total is not None
-    assert found.total.lower == pytest.approx(2 * 0.3 * 0.24740395925452294, rel=1e-6)  # a chord of 0.5 rad
+    assert present(found.total).lower == pytest.approx(
+        2 * 0.3 * 0.24740395925452294, rel=1e-6
+    )  # a chord of 0.5 rad
 
 
 def test_a_change_of_name_alone_is_told_and_moves_nothing() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from itertools import permutations
 
 import numpy as np
@@ -11,11 +10,11 @@ import pytest
 
 import urdfkin
 from tests.comparison import pairs
+from tests.comparison.pairs import loaded
+from tests.reading import present
 from urdfkin.comparison.certificate import SAME, certificate, recheck
 from urdfkin.comparison.result import Sameness, Verdict
-from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
-from urdfkin.urdf.writer import to_urdf
 
 LIMIT = '<limit lower="-1" upper="1.5" effort="1" velocity="1"/>'
 CHAIN = (
@@ -27,12 +26,6 @@ CHAIN = (
     '<joint name="knee" type="revolute"><parent link="thigh"/><child link="foot"/>'
     '<origin xyz="0 0 -0.4" rpy="0.3 0 0"/><axis xyz="1 0 0"/>' + LIMIT + "</joint></robot>"
 )
-
-
-def loaded(source: str | KinematicTree, *, verify: bool = False) -> Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(to_urdf(source) if isinstance(source, KinematicTree) else source, verify=verify)
 
 
 def moves_alike(found: Sameness, a: Robot, b: Robot) -> bool:
@@ -74,8 +67,7 @@ def test_what_hangs_on_a_free_joint_is_still_compared(kind: str) -> None:
         found = urdfkin.same(a, other)
         assert [one.place for one in found.differences] == ["joint hip"]
         assert found.differences[0].radians == pytest.approx(0.001 * np.cos(0.5), rel=0.2)
-        worst = found.worst
-        assert worst is not None
+        worst = present(found.worst)
         assert 0.0 < worst.lower <= worst.upper <= 1.03 * worst.lower
 
 
@@ -85,8 +77,7 @@ def test_a_plane_that_is_tilted_is_no_matter_of_coordinates() -> None:
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.DIFFERS
     assert found.differences[0].words.startswith("joint free: its plane is tilted by")
-    assert found.worst is not None
-    assert np.isinf(found.worst.upper)  # it slides without limits
+    assert np.isinf(present(found.worst).upper)  # it slides without limits
     assert recheck(json.loads(json.dumps(certificate(found))), a, b) == []
 
 

@@ -11,15 +11,16 @@ from pathlib import Path
 import pytest
 
 import urdfkin
+from tests import urdfs
 from tests.cli.running import urdfkin as run
 from tests.comparison.test_pairs import FOLLOWING
+from tests.reading import present
+from tests.urdfs import joint, limit, mimic
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Question, Verdict
 from urdfkin.robot import Robot
 
 pytestmark = pytest.mark.filterwarnings("ignore")
-
-LIMIT = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'
 
 
 def arm(
@@ -30,27 +31,22 @@ def arm(
     shoulder: str = "0 0 0",
 ) -> str:
     """A world, a base that is mounted in it, two joints and a tool."""
-    limit = LIMIT.format(*limits)
-    return (
-        '<robot name="arm"><link name="world"/><link name="base"/><link name="upper"/><link name="lower"/>'
-        '<link name="tcp"/>'
-        f'<joint name="mount" type="fixed"><parent link="world"/><child link="base"/>{mount}</joint>'
-        '<joint name="turn" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.1" '
-        f'rpy="{shoulder}"/><axis xyz="0 0 1"/>{limit}</joint>'
-        f'<joint name="bend" type="{second}"><parent link="upper"/><child link="lower"/>'
-        f'<origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>{LIMIT.format(-1, 1)}</joint>'
-        f'<joint name="hold" type="fixed"><parent link="lower"/><child link="tcp"/>{tool}</joint></robot>'
+    return urdfs.robot(
+        f'<joint name="mount" type="fixed"><parent link="world"/><child link="base"/>{mount}</joint>',
+        joint("turn", "revolute", "base", "upper", f'xyz="0 0 0.1" rpy="{shoulder}"', more=limit(*limits)),
+        joint("bend", second, "upper", "lower", 'xyz="0 0 0.3"', "0 1 0", limit()),
+        f'<joint name="hold" type="fixed"><parent link="lower"/><child link="tcp"/>{tool}</joint>',
+        name="arm",
     )
 
 
 def finger(multiplier: float) -> str:
     """Two fingers with the same limits, of which the second mirrors the first."""
-    limit = LIMIT.format(-0.005, 0.055)
-    return (
-        '<robot name="finger"><link name="palm"/><link name="a"/><link name="b"/>'
-        '<joint name="ja" type="prismatic"><parent link="palm"/><child link="a"/><axis xyz="0 0 -1"/>'
-        f'{limit}</joint><joint name="jb" type="prismatic"><parent link="palm"/><child link="b"/>'
-        f'<axis xyz="0 0 1"/>{limit}<mimic joint="ja" multiplier="{multiplier}"/></joint></robot>'
+    ends = limit(-0.005, 0.055)
+    return urdfs.robot(
+        joint("ja", "prismatic", "palm", "a", axis="0 0 -1", more=ends),
+        joint("jb", "prismatic", "palm", "b", more=ends + mimic("ja", multiplier)),
+        name="finger",
     )
 
 
@@ -104,8 +100,7 @@ def test_what_differs_in_orientation_alone_is_told_in_radians() -> None:
 def test_a_joint_of_another_kind_is_searched() -> None:
     a, b = arm(), arm(second="prismatic")
     found = urdfkin.same(a, b)
-    worst = found.worst
-    assert worst is not None
+    worst = present(found.worst)
 
     far = math.hypot(1.0, 0.1 * math.sin(1.0), 0.1 * (1.0 - math.cos(1.0)))  # a bend of 1 rad, a slide of 1 m
     assert worst.lower == pytest.approx(far, rel=1e-3)
@@ -137,7 +132,7 @@ def test_a_robot_that_is_mounted_elsewhere_is_equivalent_up_to_the_base(below: s
 def test_a_frame_between_two_joints_of_the_base_is_no_mount() -> None:
     more = (
         '<link name="arm2"/><joint name="other" type="revolute"><parent link="world"/><child link="arm2"/>'
-        f"{LIMIT.format(-1, 1)}</joint></robot>"
+        f"{limit()}</joint></robot>"
     )
     a, b = (arm(mount=f'<origin xyz="{x} 0 0"/>').replace("</robot>", more) for x in (0.0, 1.0))
     assert urdfkin.same(a, b, bounds=False).verdict is Verdict.DIFFERS
@@ -152,8 +147,7 @@ def test_limits_that_differ_stand_in_the_headline() -> None:
 def test_intervals_cover_the_files_limits_where_mimic_joints_leave_theirs() -> None:
     a, b = finger(-1.0), finger(-1.01)
     found = urdfkin.same(a, b)
-    assert found.worst is not None
-    assert found.worst.lower == pytest.approx(550e-6, rel=1e-3)
+    assert present(found.worst).lower == pytest.approx(550e-6, rel=1e-3)
     assert [found.exit_code(within=most) for most in (1e-4, 5.49e-4, 5.6e-4)] == [1, 1, 0]
     assert headline(a, b, within=1e-4).startswith(
         "NOT WITHIN 0.0001 m and rad without changes of B: b is 0.55 mm"
@@ -249,15 +243,11 @@ def test_what_is_printed_of_it_is_in_standard_words() -> None:
 
 
 def test_a_link_that_moved_on_a_body_without_joints_is_a_difference() -> None:
-    text = (
-        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><joint name="ab" type="fixed">'
-        '<parent link="a"/><child link="b"/><origin xyz="{} 0 0"/></joint><joint name="bc" type="fixed">'
-        '<parent link="b"/><child link="c"/><origin xyz="{} 0 0"/></joint></robot>'
-    )
+    first, second = (joint(a + b, "fixed", a, b, 'xyz="{} 0 0"', axis="") for a, b in ("ab", "bc"))
+    text = urdfs.robot(first, second)
     found = urdfkin.same(text.format(0, 1), text.format(0.5, 0.5))
     assert found.verdict is Verdict.DIFFERS
-    assert found.worst is not None
-    assert found.worst.lower == pytest.approx(0.5)
+    assert present(found.worst).lower == pytest.approx(0.5)
 
 
 def test_metres_that_are_only_bounded_are_given_as_a_bound() -> None:

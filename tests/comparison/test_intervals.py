@@ -15,6 +15,7 @@ import urdfkin
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
 from tests.comparison.searching import far, searched
+from tests.reading import present
 from urdfkin.comparison.bounds import Boxes, Search, curvature, moved_together, tightened
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
@@ -86,8 +87,7 @@ def test_a_frame_that_slides_without_end_has_no_bound() -> None:
     )
     found = urdfkin.same(text.format("0"), text.format("0.1"))
     assert found.differences[0].place == "joint turn"
-    worst = found.worst
-    assert worst is not None
+    worst = present(found.worst)
     assert worst.frame == "c"
     assert math.isinf(worst.upper)
 
@@ -107,8 +107,7 @@ BOXES = [
 
 
 def searched_boxes(name: str, what: str, link: str) -> tuple[Search, FramePair]:
-    b = changed(name, what)
-    assert b is not None
+    b = present(changed(name, what))
     return laid(robot(name), b, link)
 
 

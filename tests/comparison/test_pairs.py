@@ -13,9 +13,12 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
 from tests.dh.test_compare import disguised, elbow
+from tests.reading import present
+from tests.urdfs import joint, limit, mimic
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.dh import dh_table
@@ -54,8 +57,7 @@ def test_what_is_not_is_found_out_and_the_joint_named(turn: int) -> None:
     tree = robot(ROBOTS[turn]).tree
     if not pairs.moving(tree):
         return
-    other = changed(ROBOTS[turn], what)
-    assert other is not None
+    other = present(changed(ROBOTS[turn], what))
     found = urdfkin.same(robot(ROBOTS[turn]), other, bounds=False)
     assert found.verdict is Verdict.DIFFERS, what
     chain = pairs.moving(tree)
@@ -127,8 +129,7 @@ def test_a_table_with_other_signs_zeros_base_and_tool_is_the_same_robot(kinds: s
 
 def test_joints_of_one_name_are_each_others_however_many_hang_on_a_body() -> None:
     a = robot("go2")
-    b = changed("go2", "axis bent")
-    assert b is not None
+    b = present(changed("go2", "axis bent"))
     found = urdfkin.same(a, b)
     assert [one.a for one in found.joints] == [one.b for one in found.joints]
     assert recheck(certificate(found), a, b) == []
@@ -139,8 +140,9 @@ def test_a_vendors_table_off_by_its_last_digit_is_off_by_no_more() -> None:
     table = Path(__file__).parents[2] / "robots" / "dh" / "kinova.toml"
     found = urdfkin.same("kinova", table)
     assert found.verdict is Verdict.DIFFERS
-    assert found.worst is not None
-    assert found.worst.upper == pytest.approx(5e-5, rel=1e-6)  # d4 is given as 0.3111 m, not as 0.31105
+    assert present(found.worst).upper == pytest.approx(
+        5e-5, rel=1e-6
+    )  # d4 is given as 0.3111 m, not as 0.31105
 
 
 @pytest.mark.slow
@@ -163,12 +165,11 @@ def test_standard_and_modified_rows_of_one_robot_are_the_same() -> None:
 
 
 #: A joint that follows another one; multiplier and offset are to be filled in.
-FOLLOWING = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="k" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="j" multiplier="{}" offset="{}"/></joint>
-<joint name="e" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0"/></joint></robot>"""
+FOLLOWING = urdfs.robot(
+    joint("j", "revolute", "a", "b", more=limit()),
+    joint("k", "revolute", "b", "c", 'xyz="0.3 0 0"', more=limit() + mimic("j", "{}", "{}")),
+    joint("e", "fixed", "c", "d", 'xyz="0.3 0 0"', axis=""),
+)
 
 
 def test_a_rule_that_differs_by_less_than_the_rounding_of_the_zeros_is_no_difference() -> None:

@@ -14,9 +14,12 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
 from tests.cli.running import urdfkin as run
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
+from tests.reading import present
+from tests.urdfs import joint, limit, mimic
 from urdfkin.comparison.certificate import SAME, certificate, recheck, words_of
 from urdfkin.comparison.result import Verdict
 from urdfkin.model.mechanisms.matcher import MechanismMatcher
@@ -29,9 +32,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 def other(name: str, what: str) -> Robot:
-    found = changed(name, what)
-    assert found is not None
-    return found
+    return present(changed(name, what))
 
 
 def test_a_robot_is_itself_and_pinocchio_sees_no_distance() -> None:
@@ -117,8 +118,7 @@ def test_a_follower_that_was_dropped_is_found() -> None:
         "joint panda_finger_joint2 is a mimic joint in A and an independent joint in B: 1.0"
         " panda_finger_joint1 +0"
     ]
-    assert found.worst is not None
-    assert found.worst.lower == pytest.approx(0.04)  # one finger open, the other closed
+    assert present(found.worst).lower == pytest.approx(0.04)  # one finger open, the other closed
 
 
 @pytest.mark.slow
@@ -132,14 +132,11 @@ def test_a_joint_that_is_fixed_in_one_model_is_named_and_its_effect_bounded() ->
 
 
 def test_a_mimic_joint_with_multiplier_zero_and_a_fixed_joint_have_a_bounded_distance() -> None:
-    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
-    links = "".join(f'<link name="{name}"/>' for name in "abc")
-    first = f'<joint name="j" type="revolute"><parent link="a"/><child link="b"/>{limit}</joint>'
-    ends = '<parent link="b"/><child link="c"/><origin xyz="1 0 0"/>'
-    rest = f'{limit}<mimic joint="j" multiplier="0" offset="0.3"/>'
-    at_rest = f'{links}{first}<joint name="k" type="revolute">{ends}<axis xyz="0 1 0"/>{rest}</joint>'
-    fixed = f'{links}{first}<joint name="k" type="fixed">{ends}</joint>'
-    models = [urdfkin.load(f'<robot name="r">{text}</robot>', verify=False) for text in (at_rest, fixed)]
+    first = joint("j", "revolute", "a", "b", axis="1 0 0", more=limit())
+    rest = limit() + mimic("j", 0, 0.3)
+    at_rest = joint("k", "revolute", "b", "c", 'xyz="1 0 0"', "0 1 0", rest)
+    fixed = joint("k", "fixed", "b", "c", 'xyz="1 0 0"', axis="")
+    models = [urdfkin.load(urdfs.robot(first, second), verify=False) for second in (at_rest, fixed)]
     for a, b in (models, models[::-1]):
         found = urdfkin.same(a, b)
         assert found.verdict is Verdict.DIFFERS
@@ -226,13 +223,13 @@ def test_links_of_one_name_fix_the_zero_that_a_mimic_rule_could_give(
 
 def telescope(names: str, x: float) -> Robot:
     """Four slides along one axis; x: metres that the third one is off."""
-    joints = "".join(
-        f"<link name='l{i + 1}'/><joint name='{name}' type='prismatic'><parent link='l{i}'/>"
-        f"<child link='l{i + 1}'/><origin xyz='{x if i == 2 else 0} 0 0.2'/><axis xyz='0 0 1'/>"
-        f"<limit lower='0' upper='0.3' effort='1' velocity='1'/></joint>"
+    joints = [
+        joint(
+            name, "prismatic", f"l{i}", f"l{i + 1}", f'xyz="{x if i == 2 else 0} 0 0.2"', more=limit(0, 0.3)
+        )
         for i, name in enumerate(names)
-    )
-    return urdfkin.load(f"<robot name='t'><link name='l0'/>{joints}</robot>", verify=False)
+    ]
+    return urdfkin.load(urdfs.robot(*joints), verify=False)
 
 
 def test_slides_whose_names_agree_are_tried_in_no_other_order(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -482,20 +479,16 @@ def test_the_schema_is_printed_and_is_one() -> None:
     Draft202012Validator(done.data).validate(made)
 
 
-_IDLE = (
-    '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>'
-    '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>{limit}</joint>'
-    '<joint name="k" type="{kind}"><parent link="b"/><child link="c"/><origin xyz="{x} 0 0" rpy="0 {y} 0"/>'
-    '<axis xyz="0 1 0"/>{rest}</joint>'
-    '<joint name="l" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0 1 0"/>'
-    '<axis xyz="1 0 0"/>{limit}</joint></robot>'
+_IDLE = urdfs.robot(
+    joint("j", "revolute", "a", "b", more=limit()),
+    joint("k", "{kind}", "b", "c", 'xyz="{x} 0 0" rpy="0 {y} 0"', "0 1 0", "{rest}"),
+    joint("l", "revolute", "c", "d", 'xyz="0 1 0"', "1 0 0", limit()),
 )
-_RANGE = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
 
 
 def _idle(kind: str, offset: float) -> urdfkin.Robot:
-    rest = f'{_RANGE}<mimic joint="j" multiplier="0" offset="{offset}"/>'
-    return urdfkin.load(_IDLE.format(limit=_RANGE, kind=kind, x=1, y=0, rest=rest))
+    rest = limit() + mimic("j", 0, offset)
+    return urdfkin.load(_IDLE.format(kind=kind, x=1, y=0, rest=rest))
 
 
 @pytest.mark.parametrize(
@@ -510,7 +503,7 @@ def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(
     idle: str, kind: str, offset: float, place: dict[str, float], words: str
 ) -> None:
     """In either order, and the certificate states it and holds."""
-    models = [_idle(idle, offset), urdfkin.load(_IDLE.format(limit=_RANGE, kind=kind, rest="", **place))]
+    models = [_idle(idle, offset), urdfkin.load(_IDLE.format(kind=kind, rest="", **place))]
     for which, (a, b) in zip("AB", (models, models[::-1]), strict=True):
         found = urdfkin.same(a, b)
         assert found.verdict is Verdict.SAME, found
@@ -525,22 +518,21 @@ def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(
 
 
 def test_a_mimic_joint_with_multiplier_zero_and_a_joint_fixed_elsewhere_differ() -> None:
-    fixed = urdfkin.load(_IDLE.format(limit=_RANGE, kind="fixed", x=1, y=0.2, rest=""))
+    fixed = urdfkin.load(_IDLE.format(kind="fixed", x=1, y=0.2, rest=""))
     found = urdfkin.same(_idle("revolute", 0.25), fixed)
     assert found.verdict is Verdict.DIFFERS
-    assert found.worst is not None
-    assert found.worst.radians == pytest.approx(0.05)
+    assert present(found.worst).radians == pytest.approx(0.05)
     assert not any("only in" in one.what for one in found.differences)
 
 
 def test_a_mimic_joint_with_multiplier_zero_and_an_independent_joint_differ_in_the_rule() -> None:
-    free = urdfkin.load(_IDLE.format(limit=_RANGE, kind="revolute", x=1, y=0, rest=_RANGE))
+    free = urdfkin.load(_IDLE.format(kind="revolute", x=1, y=0, rest=limit()))
     assert [one.what for one in urdfkin.same(_idle("revolute", 0.0), free).differences] == ["mimic rule"]
 
 
 def test_a_prismatic_joint_that_never_moves_is_stated_in_metres() -> None:
-    rest = f'{_RANGE}<mimic joint="j" multiplier="0" offset="0.5"/>'
-    a = urdfkin.load(_IDLE.format(limit=_RANGE, kind="prismatic", x=1, y=0, rest=rest))
+    rest = limit() + mimic("j", 0, 0.5)
+    a = urdfkin.load(_IDLE.format(kind="prismatic", x=1, y=0, rest=rest))
     found = urdfkin.same(a, urdfkin.load(a.urdf.replace(rest, "").replace('"prismatic"', '"fixed"')))
     assert found.verdict is Verdict.DIFFERS
     assert "fixes it at 0.5 m" in str(found.remarks[0].words)

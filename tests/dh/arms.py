@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from urdfkin.dh import DHTable
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree
 
 
@@ -17,3 +20,10 @@ def arm(*steps: FloatArray, kinds: str = "", tip: FloatArray | None = None) -> K
     ]
     end = Joint("end", JointKind.FIXED, 0, np.eye(4) if tip is None else tip, z)
     return build_tree("arm", "l0", [*joints, (end, f"l{len(steps)}", "tip")])
+
+
+def with_cell(table: DHTable, row: int, cell: str, value: float) -> DHTable:
+    """The table with another value in one cell."""
+    rows = list(table.rows)
+    rows[row] = replace(rows[row], **{cell: value})  # type: ignore[arg-type]
+    return replace(table, rows=tuple(rows))

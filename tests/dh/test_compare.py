@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tests.dh.arms import arm
+from tests.dh.arms import arm, with_cell
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
 from urdfkin.dh.compare import compare, document
@@ -138,9 +138,8 @@ WRONG = [pytest.param(*one, marks=() if one in FEW else pytest.mark.long) for on
 @pytest.mark.parametrize(("row", "cell"), WRONG, ids=str)
 def test_a_wrong_cell_is_named_with_its_size(row: int, cell: str) -> None:
     table = dh_table(elbow(), "tip")
-    wrong = list(table.rows)
-    wrong[row] = replace(wrong[row], **{cell: getattr(wrong[row], cell) + 2e-3})
-    found = compare(chain(elbow(), "tip"), disguised(replace(table, rows=tuple(wrong)), 1))
+    wrong = with_cell(table, row, cell, getattr(table.rows[row], cell) + 2e-3)
+    found = compare(chain(elbow(), "tip"), disguised(wrong, 1))
     assert not found.agrees
     assert found.residual <= 1e-12
     named = [(one.row, one.cell) for one in found.differences]
@@ -154,9 +153,8 @@ def test_a_wrong_cell_is_named_with_its_size(row: int, cell: str) -> None:
 @pytest.mark.parametrize(("row", "cell"), sorted(FREE))
 def test_a_cell_that_base_or_tool_takes_up_cannot_be_wrong(row: int, cell: str) -> None:
     table = dh_table(elbow(), "tip")
-    other = list(table.rows)
-    other[row] = replace(other[row], **{cell: getattr(other[row], cell) + 0.1})
-    assert compare(chain(elbow(), "tip"), replace(table, rows=tuple(other))).exact
+    other = with_cell(table, row, cell, getattr(table.rows[row], cell) + 0.1)
+    assert compare(chain(elbow(), "tip"), other).exact
 
 
 def test_the_fitted_table_takes_the_urdfs_own_coordinates() -> None:
@@ -183,10 +181,8 @@ def test_a_table_of_other_joints_is_refused() -> None:
 
 def test_the_text_names_row_cell_and_millimetres() -> None:
     table = dh_table(elbow(), "tip")
-    wrong = (*table.rows[:2], replace(table.rows[2], a=table.rows[2].a + 3e-4), *table.rows[3:])
-    text = document(
-        compare(chain(elbow(), "tip"), replace(table, rows=wrong)), units_of("degrees", "millimetres")
-    ).text()
+    wrong = with_cell(table, 2, "a", table.rows[2].a + 3e-4)
+    text = document(compare(chain(elbow(), "tip"), wrong), units_of("degrees", "millimetres")).text()
     assert "Cells that differ (mm, deg)" in text
     assert any(
         line.split()[:3] == ["3", "j3", "a"] and line.split()[-2:] == ["-0.3", "0.3"]
@@ -197,10 +193,8 @@ def test_the_text_names_row_cell_and_millimetres() -> None:
 @pytest.mark.parametrize(("cell", "where"), [("a", "row 3, a"), ("d", "row 3, d")])
 @pytest.mark.parametrize("size", [1e155, -1e307])
 def test_a_length_whose_square_overflows_is_refused(size: float, cell: str, where: str) -> None:
-    table = dh_table(elbow(), "tip")
-    wrong = (*table.rows[:2], replace(table.rows[2], **{cell: size}), *table.rows[3:])  # type: ignore[arg-type]
     with pytest.raises(RangeError, match=where):
-        compare(chain(elbow(), "tip"), replace(table, rows=wrong))
+        compare(chain(elbow(), "tip"), with_cell(dh_table(elbow(), "tip"), 2, cell, size))
 
 
 def test_a_path_whose_square_overflows_is_refused() -> None:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from _pytest.mark import ParameterSet
 
-from tests.dh.arms import arm
+from tests.dh.arms import arm, with_cell
 from tests.dh.test_compare import disguised
 from tests.random_chains import rotation, shift
 from urdfkin.dh import dh_table
@@ -66,7 +65,7 @@ def test_a_wrong_cell_beside_such_axes_is_still_found(seed: int) -> None:
     steps = [shift(0, 0, 0.3), shift(0.05, 0.02, 0.1) @ square, shift(0.4, 0, 0.1) @ square, near]
     tree = arm(*steps, shift(0.02, -0.2, 0.1) @ square, kinds="RRRRR", tip=shift(0.1, 0, 0.08))
     table = dh_table(tree, "tip")
-    wrong = (table.rows[0], replace(table.rows[1], a=table.rows[1].a + 1e-3), *table.rows[2:])
-    found = compare(chain(tree, "tip"), disguised(replace(table, rows=wrong), seed))
+    wrong = with_cell(table, 1, "a", table.rows[1].a + 1e-3)
+    found = compare(chain(tree, "tip"), disguised(wrong, seed))
     assert not found.agrees
     assert 5e-4 < found.metres < 2e-3

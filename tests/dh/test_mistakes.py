@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.cli.test_dh import run
+from tests.dh.arms import with_cell
 from urdfkin.dh import DHTable, read_table, table_from_rows, units_of
 from urdfkin.dh.compare import Comparison, compare, document
 from urdfkin.dh.convert import to_tree
@@ -28,12 +29,6 @@ AS_WRITTEN = ("panda", "ur5", pytest.param("xarm7_standard", marks=pytest.mark.l
 def shipped(name: str) -> tuple[FrameChain, DHTable]:
     table = read_table(reference_path(name))
     return load(table.robot).chain(table.tip_frame, table.base_frame), table
-
-
-def with_cell(table: DHTable, row: int, cell: str, value: float) -> DHTable:
-    rows = list(table.rows)
-    rows[row] = replace(rows[row], **{cell: value})  # type: ignore[arg-type]
-    return replace(table, rows=tuple(rows))
 
 
 def with_wrong_signs(table: DHTable) -> Iterator[tuple[int, str, DHTable]]:
@@ -142,14 +137,14 @@ def test_the_command_fails_for_a_wrong_sign_and_says_what_to_do(tmp_path: Path) 
     text = reference_path("ur5").read_text()
     file.write_text(text.replace("d = 0.10915", "d = -0.10915"))
     result = run("ur5", "--compare", str(file), "--millimetres")
-    assert result.exit_code == 1
-    assert "agrees only after a fit of base, tool and joint offsets" in result.stdout
-    assert "One change makes the table right without a fit:" in result.stdout
-    assert "  row 4, wrist_1_joint: d = 109.15 mm, not -109.15 (its sign)" in result.stdout
-    data = json.loads(run("ur5", "--compare", str(file), "--format", "json").stdout)
+    assert result.code == 1
+    assert "agrees only after a fit of base, tool and joint offsets" in result.text
+    assert "One change makes the table right without a fit:" in result.text
+    assert "  row 4, wrist_1_joint: d = 109.15 mm, not -109.15 (its sign)" in result.text
+    data = json.loads(run("ur5", "--compare", str(file), "--format", "json").text)
     assert data["agrees"]
     assert not data["passes"]
     assert data["likely_mistakes"][0]["cell"]["urdf"] == 0.10915
     without = run("ur5", "--compare", str(file), "--no-fit")
-    assert without.exit_code == 1
-    assert "One change makes the table right without a fit:" in without.stdout
+    assert without.code == 1
+    assert "One change makes the table right without a fit:" in without.text

@@ -290,16 +290,16 @@ def test_a_urdf_may_end_in_txt(tmp_path: Path) -> None:
 def test_a_table_given_as_robot_is_written_as_it_stands(tmp_path: Path) -> None:
     path, out = str(reference_path("kinova")), tmp_path / "again.csv"
     result = run(path, "--degrees")
-    assert "q1 + 180" in result.stdout
-    assert "agrees within rounding" in result.stdout
-    assert run(path, "--format", "csv", "-o", str(out)).exit_code == 0
+    assert "q1 + 180" in result.text
+    assert "agrees within rounding" in result.text
+    assert run(path, "--format", "csv", "-o", str(out)).code == 0
     assert read_table(out).rows[0].theta == math.pi
     modified = run(path, "--convention", "modified", "--format", "csv", "-o", str(out))
-    assert modified.exit_code == 0
+    assert modified.code == 0
     wanted = to_convention(read_table(path), "modified")
     assert [row.cells for row in read_table(out).rows] == [row.cells for row in wanted.rows]
     derived = run(path, "--last", "flange")
-    assert "q1 + pi" not in derived.stdout
+    assert "q1 + pi" not in derived.text
 
 
 @pytest.mark.parametrize(

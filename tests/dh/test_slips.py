@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,12 @@ import pytest
 
 from tests.cli.test_dh import run
 from tests.dh.test_compare import elbow
+from tests.reading import present
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
 from urdfkin.dh.compare import TOLERANCE, diagnose
 from urdfkin.dh.compare.slips import as_said, doubts, other_readings
 from urdfkin.dh.parse_table import reference_path
 from urdfkin.dh.rows import ORDER
-from urdfkin.errors import InputError
 from urdfkin.model.chain import chain
 from urdfkin.robot.loading import load
 from urdfkin.urdf.findings import UrdfWarning
@@ -63,8 +64,7 @@ def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) ->
     path = load(reference.robot).chain(reference.tip_frame, reference.base_frame)
     options, words = SLIPS[slip]
     wrong = "modified" if str(reference.convention) == "standard" else "standard"
-    found = diagnose(path, written(reference, wrong, **options), TOLERANCE)
-    assert found is not None
+    found = present(diagnose(path, written(reference, wrong, **options), TOLERANCE))
     assert found.reading.words(found.said).startswith(words.format(reference.convention))
     assert found.metres <= 5.01e-5
     assert found.reading.slips(found.said) <= 4
@@ -73,8 +73,7 @@ def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) ->
 @pytest.mark.parametrize("kinds", ["RRPRRR", "PRRRRR"])
 def test_a_slip_is_named_where_a_joint_slides(kinds: str) -> None:
     tree = elbow(kinds)
-    found = diagnose(chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6)
-    assert found is not None
+    found = present(diagnose(chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6))
     assert found.reading.words(found.said) == "millimetres"
 
 
@@ -113,14 +112,14 @@ def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> No
     arguments = ("ur5", "--base", "base", "--tip", "tool0", "--compare", str(file))
     file.write_text('convention = "modified"\nangles = "degrees"\n' + text)
     result = run(*arguments)
-    assert result.exit_code == 1
-    assert "rad when it is read as standard, millimetres\n" in result.stdout
+    assert result.code == 1
+    assert "rad when it is read as standard, millimetres\n" in result.text
     file.write_text('convention = "standard"\n' + text)
-    with pytest.raises(
-        InputError,
-        match=r"more than one turn.*the table agrees with the URDF to .* read as millimetres, degrees",
-    ):
-        run(*arguments)
+    refused = run(*arguments)
+    assert refused.code == 2
+    assert re.search(
+        "more than one turn.*the table agrees with the URDF to .* read as millimetres, degrees", refused.err
+    )
 
 
 def test_a_table_alone_is_doubted_only_where_it_cannot_be_meant() -> None:
@@ -170,9 +169,9 @@ def test_a_table_that_names_no_convention_is_compared_in_the_one_that_fits(
 ) -> None:
     file = nameless(tmp_path / "ur5.toml", convention)
     result = run(*UR5, "--compare", str(file))
-    assert result.exit_code == 0
-    assert f"The table names no convention; {convention} fits best." in result.stdout
-    data = json.loads(run(*UR5, "--compare", str(file), "--format", "json").stdout)
+    assert result.code == 0
+    assert f"The table names no convention; {convention} fits best." in result.text
+    data = json.loads(run(*UR5, "--compare", str(file), "--format", "json").text)
     assert data["read_as"] == convention
 
 
@@ -180,22 +179,22 @@ def test_a_table_that_names_no_convention_is_compared_in_the_one_that_fits(
 def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "modified")
     file.write_text(file.read_text().replace('"-pi/2"', "-90").replace('"pi/2"', "90"))
-    with pytest.raises(
-        InputError,
-        match=r"more than one turn.*the table agrees with the URDF to .* when it is read as degrees",
-    ):
-        run(*UR5, "--compare", str(file))
+    refused = run(*UR5, "--compare", str(file))
+    assert refused.code == 2
+    assert re.search(
+        "more than one turn.*the table agrees with the URDF to .* when it is read as degrees", refused.err
+    )
 
 
 @pytest.mark.slow
 def test_a_table_that_fits_in_no_convention_is_refused_with_how_far_it_is_off(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "standard")
-    with pytest.raises(
-        InputError, match=r"and neither fits: found tip errors .* mm as standard and .* as modified"
-    ):
-        run("ur3", *UR5[1:], "--compare", str(file))
-    with pytest.raises(InputError, match="the path have different joints"):
-        run("panda", "--compare", str(file))
+    refused = run("ur3", *UR5[1:], "--compare", str(file))
+    assert refused.code == 2
+    assert re.search("and neither fits: found tip errors .* mm as standard and .* as modified", refused.err)
+    refused = run("panda", "--compare", str(file))
+    assert refused.code == 2
+    assert "the path have different joints" in refused.err
 
 
 @pytest.mark.slow
@@ -203,6 +202,6 @@ def test_a_mistake_tells_the_convention_too(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "standard")
     file.write_text(file.read_text().replace("0.425, 0", '0.425, "pi/2"'))
     result = run(*UR5, "--compare", str(file))
-    assert result.exit_code == 1
-    assert "standard fits best" in result.stdout
-    assert "row 2, shoulder_lift_joint: alpha = 0 rad, not pi/2" in result.stdout
+    assert result.code == 1
+    assert "standard fits best" in result.text
+    assert "row 2, shoulder_lift_joint: alpha = 0 rad, not pi/2" in result.text

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from tests.dh.arms import arm
 from tests.random_chains import configurations, rotation, shift, trees
+from tests.reading import present
 from urdfkin.dh import DHTable, dh_table
 from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.table import SnapChange, SnapReport
@@ -87,8 +88,7 @@ def test_snapping_any_chain_keeps_its_word(tree: KinematicTree, tolerance: float
 @settings(max_examples=40)
 def test_the_declared_bound_is_not_idle(seed: int) -> None:
     tree = nearly_round(seed, 1e-4, slides=False)
-    snap = dh_table(tree, "tip", snap=3e-4).snap
-    assert snap is not None
+    snap = present(dh_table(tree, "tip", snap=3e-4).snap)
     assume(snap.metres > 1e-6)
     assert snap.measured_metres <= snap.metres
     assert snap.metres <= 30.0 * snap.measured_metres
@@ -110,8 +110,7 @@ def test_angles_that_are_nearly_round_become_round(seed: int) -> None:
 def test_a_bound_with_a_sliding_joint_grows_with_its_travel() -> None:
     tilted = rotation("x", math.pi / 2 + 1e-5) @ shift(0.3, 0, 0)
     tree = arm(tilted, shift(0.1, 0, 0.2), kinds="RP", tip=shift(0, 0, 0.1))
-    snap = dh_table(tree, "tip", snap=1e-4).snap
-    assert snap is not None
+    snap = present(dh_table(tree, "tip", snap=1e-4).snap)
     assert set(snap.per_metre) == {"j2"}
     assert snap.per_metre["j2"] == pytest.approx(1e-5, rel=1e-3)
     near, far = snap.bound({"j2": np.array([0.0, 5.0])})
@@ -128,8 +127,7 @@ def test_an_exact_right_angle_is_nothing_to_snap() -> None:
 def test_snapping_touches_no_angle_beyond_its_tolerance() -> None:
     table = dh_table(arm(np.eye(4), shift(0.3, 0, 0) @ rotation("x", math.pi / 2 + 2e-3)), "tip", snap=1e-3)
     assert table.rows[0].alpha == pytest.approx(math.pi / 2 + 2e-3)
-    assert table.snap is not None
-    assert table.snap.changes == ()
+    assert present(table.snap).changes == ()
 
 
 # -- the bound of a snapped table, number for number: each angle times the way from its pivot to the tip -----
@@ -152,8 +150,7 @@ def test_an_angle_at_the_first_joint_is_seen_along_the_whole_way_and_one_at_the_
             shift(3.0, 0, 0) @ rotation("x", quarter + tilts[1]),
             tip=shift(0, 0.5, 0),
         )
-        snap = dh_table(tree, "tip", snap=10 * OFF).snap
-        assert snap is not None
+        snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
         assert snap.radians == pytest.approx(OFF, rel=1e-9)
         assert snap.metres == pytest.approx(OFF * lever, rel=1e-9)
         assert 0.0 < snap.measured_metres <= snap.metres
@@ -170,8 +167,7 @@ def test_an_angle_made_of_two_fixed_ones_is_seen_from_the_joint_behind_it(beyond
         (Joint("c", JointKind.REVOLUTE, 0, shift(beyond, 0, 0), z), "l3", "l4"),
         (Joint("end", JointKind.FIXED, 0, shift(0, 0.5, 0), z), "l4", "tip"),
     ]
-    snap = dh_table(build_tree("bolted", "l0", joints), "tip", snap=10 * OFF).snap
-    assert snap is not None
+    snap = present(dh_table(build_tree("bolted", "l0", joints), "tip", snap=10 * OFF).snap)
     assert [change.lever for change in snap.changes] == [pytest.approx(beyond + 0.5)]
     assert snap.metres == pytest.approx(OFF * (beyond + 0.5), rel=1e-9)
     assert 0.0 < snap.measured_metres <= snap.metres
@@ -192,8 +188,7 @@ def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
     ("limit", "travel"), [(None, 1.0), (Limit(-0.5, 3.0, 1.0, 1.0), 3.0), (Limit(-4.0, 3.0, 1.0, 1.0), 4.0)]
 )
 def test_the_travel_of_what_slides_lengthens_the_lever(limit: Limit | None, travel: float) -> None:
-    snap = dh_table(sliding(limit), "tip", snap=10 * OFF).snap
-    assert snap is not None
+    snap = present(dh_table(sliding(limit), "tip", snap=10 * OFF).snap)
     assert snap.per_metre == {"b": pytest.approx(OFF, rel=1e-9)}
     assert snap.metres == pytest.approx(OFF * (2.0 + travel), rel=1e-9)
     assert snap.bound({"b": np.array([0.0, -5.0])}) == pytest.approx([2.0 * OFF, 7.0 * OFF], rel=1e-9)
@@ -210,8 +205,7 @@ def test_what_several_changes_move_for_each_metre_of_a_slider_adds_up() -> None:
     tree = arm(
         rotation("x", math.pi / 2 + OFF), shift(1.0, 0, 0) @ rotation("x", math.pi / 2 + 2 * OFF), kinds="RP"
     )
-    snap = dh_table(tree, "tip", snap=10 * OFF).snap
-    assert snap is not None
+    snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
     assert snap.per_metre == {"j2": pytest.approx(3 * OFF, rel=1e-9)}
 
 

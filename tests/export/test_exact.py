@@ -8,7 +8,6 @@ import operator
 import re
 import shutil
 import subprocess
-import warnings
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import count
@@ -24,6 +23,8 @@ from tests.counted import Counted, Matrix, all_conspiring, deviation, eq
 from tests.export.writing import ALL, code
 from tests.kinematics.test_roundings import PARTS, most, of_sines, theirs, turn
 from tests.laws.subjects import robot_of
+from tests.reading import present
+from tests.urdfs import loaded
 from urdfkin.export import exact as exact_module
 from urdfkin.export import recursion, write
 from urdfkin.export.c import framed
@@ -48,9 +49,7 @@ _ARM = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/><lin
 
 
 def arm(rpy: str, axis: str = "0 0 1", offset: str = "1.5707963267948966") -> Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # an axis that is not a unit vector
-        return urdfkin.load(_ARM.format(rpy=rpy, axis=axis, offset=offset))
+    return loaded(_ARM.format(rpy=rpy, axis=axis, offset=offset))  # an axis that is not a unit vector
 
 
 def algebra(robot: Robot, *quantities: str) -> tuple[Any, dict[str, Any]]:
@@ -65,8 +64,7 @@ def algebra(robot: Robot, *quantities: str) -> tuple[Any, dict[str, Any]]:
 @pytest.mark.parametrize("rpy", ["0.3 -0.2 0.7", "1.57 0 0", "0 0 0"])
 def test_expressions_are_equal_to_the_chain_at_fifty_digits(rpy: str, axis: str) -> None:
     robot = arm(rpy, axis, "0.25")
-    exact = code(robot).exact
-    assert exact is not None
+    exact = present(code(robot).exact)
     found = exact()
     assert found.proof.certificate.verified
     assert {function.name for function in found.functions} == set(ALL)

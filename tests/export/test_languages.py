@@ -18,10 +18,13 @@ import pytest
 from flint import arb
 
 import urdfkin
+from tests import urdfs
 from tests.cli.running import urdfkin as command
 from tests.export.writing import ALL, built, code, file, need, ran
 from tests.high_precision import mp, true_motion
 from tests.laws.subjects import robot_of, state
+from tests.reading import module_of
+from tests.urdfs import joint, limit, mimic
 from urdfkin.dh import export
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.export import LANGUAGES, write
@@ -38,16 +41,6 @@ RUN = [to for to in LANGUAGES if to != "latex"]
 _THREE = ("placement", "jacobian", "acceleration")
 #: Languages whose check runs in double and in single precision.
 BOTH = ("c", "cpp", "cuda", "array", "jax", "torch")
-
-
-def module(path: Path) -> ModuleType:
-    """A file, imported."""
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    found = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(found)
-    return found
 
 
 @pytest.mark.slow
@@ -228,7 +221,7 @@ def test_a_file_can_say_so_without_urdfkin(tmp_path: Path) -> None:
 
 def test_numpys_functions_take_any_batch(tmp_path: Path) -> None:
     robot = robot_of("panda")
-    own = module(file(code(robot), "numpy", tmp_path))
+    own = module_of(file(code(robot), "numpy", tmp_path))
     q, v, a = state(robot, 6, 1)
     q = q.reshape(2, 3, -1)
     assert own.jacobian(q).shape == (2, 3, 6, robot.nv)
@@ -258,7 +251,7 @@ def test_the_file_for_any_array_computes_true_values_in_a_namespace(name: str, t
     xp = namespace(name)
     for robot in (urdfkin.load("ur5"), robot_of("planar_and_floating_in_the_middle")):
         asked = tuple(row for row in ALL if row != "hessian")
-        found = module(file(code(robot, quantities=asked), "array", tmp_path)).check(xp)
+        found = module_of(file(code(robot, quantities=asked), "array", tmp_path)).check(xp)
         assert len(found) == 2 * len(asked)
         assert max(found.values()) < 1.0
 
@@ -277,7 +270,7 @@ def test_no_array_is_written_in_place(to: str) -> None:
 @pytest.mark.parametrize("name", NAMESPACES)
 def test_functions_of_any_array_refuse_a_wrong_length_and_whole_numbers(name: str, tmp_path: Path) -> None:
     xp, robot = namespace(name), urdfkin.load("planar_two_link")
-    own = module(file(code(robot, quantities=("velocity",)), "array", tmp_path))
+    own = module_of(file(code(robot, quantities=("velocity",)), "array", tmp_path))
     right = xp.zeros((5, 2), dtype=xp.float64)
     for q, found in ((xp.zeros((5, 3), dtype=xp.float64), r"\(5, 3\)"), (right[:, :1], r"\(5, 1\)")):
         with pytest.raises(ValueError, match=rf"q needs 2 numbers on its last axis: found the shape {found}"):
@@ -294,7 +287,7 @@ def test_functions_of_any_array_refuse_a_wrong_length_and_whole_numbers(name: st
 
 
 def test_numpys_functions_refuse_a_wrong_length_and_convert_whole_numbers(tmp_path: Path) -> None:
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), "numpy", tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), "numpy", tmp_path))
     assert np.array_equal(own.placement([0, 1]), own.placement([0.0, 1.0]))
     for wrong in ([0.0], [0.0, 1.0, 2.0], 0.0):
         with pytest.raises(ValueError, match="q needs 2 numbers on its last axis"):
@@ -313,7 +306,7 @@ def test_numpys_functions_refuse_a_wrong_length_and_convert_whole_numbers(tmp_pa
     ],
 )
 def test_numpys_functions_refuse_numbers_that_are_not_real(wrong: Any, found: str, tmp_path: Path) -> None:
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numpy", tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numpy", tmp_path))
     with pytest.raises(TypeError, match=rf"q needs real numbers: found {found}$"):
         own.velocity(wrong, [0.0, 0.0])
     with pytest.raises(TypeError, match=rf"v needs real numbers: found {found}$"):
@@ -323,7 +316,7 @@ def test_numpys_functions_refuse_numbers_that_are_not_real(wrong: Any, found: st
 @pytest.mark.parametrize("to", ["numpy", "array"])
 def test_nan_in_an_input_reaches_every_result_that_depends_on_it(to: str, tmp_path: Path) -> None:
     robot = robot_of("planar_and_floating_in_the_middle")
-    own = module(file(code(robot, quantities=_THREE), to, tmp_path))
+    own = module_of(file(code(robot, quantities=_THREE), to, tmp_path))
     for name, given in zip(_THREE, (1, 1, 3), strict=True):
         function, inputs = getattr(own, name), [x[0] for x in state(robot, 1, 4)][:given]
         right = function(*inputs)
@@ -343,7 +336,7 @@ def test_functions_of_any_array_refuse_what_is_no_array(
 ) -> None:
     if not installed:
         monkeypatch.setitem(sys.modules, "array_api_compat", None)
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "array", tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "array", tmp_path))
     right = np.zeros(2)
     for wrong, found in (([0.0, 0.0], "list"), ("ab", "str"), (None, "NoneType")):
         with pytest.raises(
@@ -357,7 +350,7 @@ def test_functions_of_any_array_refuse_what_is_no_array(
 def test_functions_of_casadi_refuse_a_wrong_length(tmp_path: Path) -> None:
     casadi: Any = pytest.importorskip("casadi")
     written = file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "casadi", tmp_path)
-    own = module(written)
+    own = module_of(written)
     for kind in (casadi.SX, casadi.MX):
         for right in (kind.sym("q", 2), kind.sym("q", 1, 2), [0.0, kind.sym("q")], np.zeros(2)):
             assert own.velocity(right, [0.0, 1.0]).shape == (6, 1)
@@ -375,7 +368,7 @@ def test_functions_of_casadi_refuse_a_wrong_length(tmp_path: Path) -> None:
 @pytest.mark.parametrize("to", ["sympy", "sympy-exact"])
 def test_functions_of_sympy_refuse_a_wrong_length(to: str, tmp_path: Path) -> None:
     sympy: Any = pytest.importorskip("sympy")
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), to, tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), to, tmp_path))
     right = sympy.symbols("q:2")
     assert own.velocity(right, sympy.Matrix(right)).shape == (6, 1)
     for wrong in (sympy.symbols("q:3"), [0]):
@@ -403,7 +396,7 @@ def test_functions_of_matlab_refuse_a_wrong_length(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_numbas_functions_refuse_a_wrong_length(tmp_path: Path) -> None:
     written = file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numba", tmp_path)
-    own = module(written)
+    own = module_of(written)
     q = np.zeros(3)
     for wrong in (q, q[:1]):
         with pytest.raises(ValueError, match="q needs 2 numbers"):
@@ -414,7 +407,7 @@ def test_numbas_functions_refuse_a_wrong_length(tmp_path: Path) -> None:
 
 
 def test_a_namespace_that_makes_float32_of_float64_is_an_error_of_the_check(tmp_path: Path) -> None:
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), "array", tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), "array", tmp_path))
     narrow = SimpleNamespace(
         asarray=lambda x, dtype: np.asarray(x, dtype=np.float32), float64=np.float64, float32=np.float32
     )
@@ -440,13 +433,11 @@ def _torch(gradcheck: Callable[..., bool]) -> ModuleType:
     return made
 
 
-_GEARED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="end" type="fixed"><parent link="c"/><child link="d"/><origin xyz="0.5 0 0.2"/></joint>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
-<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
-<joint name="k" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
-<origin xyz="1 0 0"/><mimic joint="j" multiplier="{}"/>
-<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+_GEARED = urdfs.robot(
+    joint("end", "fixed", "c", "d", 'xyz="0.5 0 0.2"', axis=""),
+    joint("j", "revolute", "a", "b", more=limit(-2, 2)),
+    joint("k", "revolute", "b", "c", 'xyz="1 0 0"', "0 1 0", mimic("j", "{}") + limit(-1e9, 1e9)),
+)
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
@@ -472,7 +463,7 @@ def test_the_tolerance_of_difference_quotients_includes_their_truncation(
         return bool(np.all(np.abs(found - slopes[name](np.asarray(q))) <= atol))
 
     monkeypatch.setitem(sys.modules, "torch", _torch(gradcheck))
-    own = module(file(written, "torch", tmp_path))
+    own = module_of(file(written, "torch", tmp_path))
     assert own.gradients() == {"placement": True, "jacobian": True}
     # The tolerance is still small compared with the derivatives.
     assert all(atol < 1e-5 * (1.0 + multiplier) ** (1 + (name == "jacobian")) for name, atol in seen)
@@ -484,7 +475,7 @@ def test_the_tolerance_of_difference_quotients_includes_their_truncation(
 @pytest.mark.parametrize("name", NAMESPACES)
 def test_functions_of_any_array_broadcast_leading_axes_and_keep_the_type(name: str, tmp_path: Path) -> None:
     xp, robot = namespace(name), robot_of("panda")
-    own = module(file(code(robot), "array", tmp_path))
+    own = module_of(file(code(robot), "array", tmp_path))
     q, v, a = state(robot, 6, 1)
     q = q.reshape(2, 3, -1)
     for kind, exact in ((xp.float64, 1e-12), (xp.float32, 1e-4)):
@@ -502,7 +493,7 @@ def test_gradients_through_any_array_are_the_hessian_within_its_bound(tmp_path: 
     namespace("jax.numpy")
     jax: Any = pytest.importorskip("jax")
     robot = robot_of("panda")
-    own = module(file(code(robot, quantities=("jacobian",)), "array", tmp_path))
+    own = module_of(file(code(robot, quantities=("jacobian",)), "array", tmp_path))
     q, _, _ = state(robot, 5, 2)
     call = Call(robot.tree, robot.plan, robot.tip_frame, Reference.LOCAL_WORLD_ALIGNED, None, (q,))
     bound = bound_of(QUANTITIES["hessian"], call.part(slice(0, 5)))
@@ -520,7 +511,7 @@ def test_functions_of_pytorch_refuse_what_is_no_tensor_of_floating_numbers(
         torch: Any = importlib.import_module("torch")
     except ModuleNotFoundError:
         monkeypatch.setitem(sys.modules, "torch", torch := _torch(lambda *_, **__: True))
-    own = module(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "torch", tmp_path))
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "torch", tmp_path))
     right = torch.tensor([0.0, 1.0], dtype=torch.float64)
     assert own.velocity(right, right).shape == (6,)
     for wrong, error, found in (
@@ -569,7 +560,7 @@ def test_the_check_of_an_imported_file_of_jax_computes_in_double_precision(tmp_p
     before = jax.config.jax_enable_x64
     jax.config.update("jax_enable_x64", False)
     try:
-        own = module(file(code(urdfkin.load("ur5"), quantities=("placement",)), "jax", tmp_path))
+        own = module_of(file(code(urdfkin.load("ur5"), quantities=("placement",)), "jax", tmp_path))
         assert max(own.check().values()) <= 1.0
         assert not jax.config.jax_enable_x64
     finally:
@@ -581,7 +572,7 @@ def test_jax_differentiates_maps_and_compiles_it(tmp_path: Path) -> None:
     jax: Any = pytest.importorskip("jax")
     jax.config.update("jax_enable_x64", True)
     robot = robot_of("panda")
-    own = module(file(code(robot, quantities=("placement", "jacobian", "velocity")), "jax", tmp_path))
+    own = module_of(file(code(robot, quantities=("placement", "jacobian", "velocity")), "jax", tmp_path))
     q, v, _ = state(robot, 5, 2)
     Js = np.asarray(jax.vmap(jax.jit(own.jacobian))(q))
     slopes = jax.vmap(jax.jacfwd(lambda x: own.placement(x)[:3, 3]))(q)
@@ -602,11 +593,11 @@ def test_casadis_and_sympys_symbols_differentiate_to_the_jacobian(tmp_path: Path
     written = code(robot, quantities=("placement", "jacobian"))
     q = [0.3, -0.7]
     J = robot.jacobian(q, robot.tip_frame)[:3]
-    own = module(file(written, "casadi", tmp_path))
+    own = module_of(file(written, "casadi", tmp_path))
     x = casadi.SX.sym("q", 2)
     slopes = casadi.Function("J", [x], [casadi.jacobian(own.placement(x)[:3, 3], x)])(q)
     assert np.abs(np.array(slopes) - J).max() < 1e-15
-    own = module(file(written, "sympy", tmp_path))
+    own = module_of(file(written, "sympy", tmp_path))
     y = sympy.symbols("q:2")
     symbolic = own.placement(y)[:3, 3].jacobian(y).subs(dict(zip(y, q, strict=True)))
     assert np.abs(np.array(symbolic, dtype=float) - J).max() < 1e-15
@@ -664,7 +655,7 @@ def test_the_code_of_a_form_computes_what_pinocchio_computes(form: str, tmp_path
     robot = urdfkin.load("panda")
     path = tmp_path / "arm.py"
     path.write_text(robot.export("numpy", "panda_hand", form=form), encoding="utf-8")
-    found, q = module(path), robot.sample(20)
+    found, q = module_of(path), robot.sample(20)
     own = q[:, :7]  # the fingers are not on the path
     T = robot.relative_placement(q, "panda_hand", robot.base_frame)
     np.testing.assert_allclose(found.placement(own), T, rtol=0.0, atol=1e-14)

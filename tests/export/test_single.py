@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
@@ -14,9 +13,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import urdfkin
-from tests.export.test_languages import module
+from tests import urdfs
 from tests.export.writing import code, file
 from tests.laws.subjects import robot_of, state
+from tests.reading import module_of
+from tests.urdfs import joint, limit, loaded, mimic
 from urdfkin.export import proof, single
 from urdfkin.export.expression import Graph, Node
 from urdfkin.export.function import Function
@@ -167,21 +168,13 @@ def test_a_number_beyond_the_largest_has_no_bound() -> None:
 
 # -- in files -----------------------------------------------------------------------------------------------
 
-_FIXED = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed"><parent link="a"/>
-<child link="b"/><origin xyz="{}" rpy="{}"/></joint></robot>"""
-
-
-def loaded(text: str) -> urdfkin.Robot:
-    """A robot whose lengths may be unusual."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(text)
+_FIXED = urdfs.robot(joint("j", "fixed", "a", "b", 'xyz="{}" rpy="{}"', axis=""))
 
 
 def shares(text: str, folder: Path) -> dict[tuple[str, str], float]:
     """What a file finds itself, in both precisions."""
     written = code(loaded(text), "b", ("placement",))
-    found: dict[tuple[str, str], float] = module(file(written, "array", folder)).check()
+    found: dict[tuple[str, str], float] = module_of(file(written, "array", folder)).check()
     return found
 
 
@@ -204,16 +197,17 @@ def test_a_file_needs_the_errors_of_its_double_constants(
 
 def shares_of(robot: urdfkin.Robot, quantities: tuple[str, ...], folder: Path, frame: str) -> float:
     """The largest error of a file in double precision, as a share of its bound."""
-    own = module(file(code(robot, frame, quantities), "array", folder))
+    own = module_of(file(code(robot, frame, quantities), "array", folder))
     return max(float(share) for (_, kind), share in own.check().items() if kind == "float64")
 
 
-_TURNED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin rpy="{angle} {angle} 0.1"/>
-<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
-<joint name="k" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>
-<origin xyz="1 0 0"/><mimic joint="j" multiplier="{multiplier}" offset="{offset}"/>
-<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+_TURNED = urdfs.robot(
+    joint("j", "revolute", "a", "b", 'rpy="{angle} {angle} 0.1"', more=limit(-2, 2)),
+    joint(
+        "k", "revolute", "b", "c", 'xyz="1 0 0"', "0 1 0",
+        mimic("j", "{multiplier}", "{offset}") + limit(-1e9, 1e9),
+    ),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", range(1, 4))
@@ -233,15 +227,11 @@ def test_a_file_of_large_angles_and_rules_needs_the_rounding_of_their_decimals(
     assert shares_of(held, ("placement",), tmp_path, "c") > 1.0
 
 
-_CANCELLED = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
-<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
-<joint name="k" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
-<mimic joint="i" multiplier="-37.123" offset="{offset}"/>
-<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint>
-<joint name="i" type="prismatic"><parent link="a"/><child link="d"/><axis xyz="0 0 1"/>
-<mimic joint="j" multiplier="0.001" offset="{before}"/>
-<limit lower="-1e9" upper="1e9" velocity="1" effort="1"/></joint></robot>"""
+_CANCELLED = urdfs.robot(
+    joint("j", "revolute", "a", "b", axis="0 1 0", more=limit(-2, 2)),
+    joint("k", "prismatic", "b", "c", more=mimic("i", -37.123, "{offset}") + limit(-1e9, 1e9)),
+    joint("i", "prismatic", "a", "d", more=mimic("j", 0.001, "{before}") + limit(-1e9, 1e9)),
+)
 
 
 @pytest.mark.parametrize("before", ["6732.655", "589262.492", "58731509.822"])
@@ -295,7 +285,7 @@ def test_the_bound_holds_in_many_configurations_and_is_not_much_larger_than_the_
 ) -> None:
     robot = robot_of(name)
     written = code(robot, quantities=("placement", "jacobian", "jacobian_rate", "acceleration"))
-    own = module(file(written, "array", tmp_path))
+    own = module_of(file(written, "array", tmp_path))
     given = [x.astype(np.float32).astype(np.float64) for x in state(robot, 200, 3)]
     for of in written.functions:
         used = given[: len(of.inputs)]

@@ -1,13 +1,11 @@
 """Robots that the laws are tried on: every joint kind, followers, branches, real and made up."""
 
-import warnings
-
 import numpy as np
 import pinocchio as pin
 
-import urdfkin
 from tests.robots.against_pinocchio import coupling, model_of
 from tests.robots.odd_urdfs import urdf_of
+from tests.urdfs import loaded
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
@@ -27,9 +25,7 @@ NAMES = (
 def robot_of(name: str, *, mimic: bool | None = None, root_joint: str | None = None) -> Robot:
     """One of them; `verify` is off, because a law must not lean on the oracle."""
     source = name if name in ("panda", "a1") else urdf_of(name)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(source, verify=False, mimic=mimic, root_joint=root_joint)
+    return loaded(source, verify=False, mimic=mimic, root_joint=root_joint)
 
 
 def state(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:

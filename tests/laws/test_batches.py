@@ -2,7 +2,6 @@
 
 import math
 import tracemalloc
-import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -18,6 +17,7 @@ import urdfkin
 from tests.laws.everything import by_the_robot, differing, on_its_way_alone, prepared
 from tests.laws.subjects import NAMES, robot_of, state
 from tests.robots.odd_urdfs import Urdf
+from tests.urdfs import loaded
 from urdfkin import load
 from urdfkin.compiled.evaluate import PART
 from urdfkin.compiled.plan import LANES
@@ -398,18 +398,12 @@ ROWS = (0, 7, 8, LANES - 1, LANES, 2 * LANES, SAMPLES - 1)
 KINDS = ("revolute", "prismatic", "continuous")
 
 
-def loaded(urdf: Urdf) -> Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(urdf.text, verify=False)
-
-
 def chain(joints: int) -> Robot:
     """A chain in which each kind of axial joint is met."""
     urdf = Urdf(f"chain_{joints}", joints)
     for i in range(joints):
         urdf.add(KINDS[i % 3])
-    return loaded(urdf)
+    return loaded(urdf.text, verify=False)
 
 
 def mixed(floating: bool) -> Robot:
@@ -418,7 +412,7 @@ def mixed(floating: bool) -> Robot:
     for kind in ("revolute", "planar", "prismatic", *["floating"] * floating, "continuous", "planar"):
         urdf.add(kind)
     urdf.add("revolute", mimic=("joint_0", -0.7, 0.2))
-    return loaded(urdf)
+    return loaded(urdf.text, verify=False)
 
 
 def broom(branches: int, joints: int) -> Robot:
@@ -427,7 +421,7 @@ def broom(branches: int, joints: int) -> Robot:
     for branch in range(branches):
         for i in range(joints):
             urdf.add(KINDS[(branch + i) % 3], None if i else 0, joint=f"b{branch}_{i:02}")
-    return loaded(urdf)
+    return loaded(urdf.text, verify=False)
 
 
 def faults(robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray) -> Iterator[str]:

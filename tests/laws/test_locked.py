@@ -14,8 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from tests import urdfs
 from tests.laws.subjects import robot_of, state
+from tests.reading import present
 from tests.strategies import trees
+from tests.urdfs import joint, limit, loaded, mimic
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.errors import OracleError
 from urdfkin.kinematics.rotation import rotation_from_rpy
@@ -53,8 +56,7 @@ def values_at(robot: Robot, q: FloatArray, names: list[str]) -> dict[str, float]
 
 
 def held(robot: Robot, name: str) -> float:
-    lock = robot.joints[name].lock
-    assert lock is not None
+    lock = present(robot.joints[name].lock)
     return lock.value
 
 
@@ -136,9 +138,7 @@ def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> Non
 @given(st.data())
 def test_any_tree_with_any_joints_locked_is_the_whole_tree_at_these_values(data: st.DataObject) -> None:
     text = to_urdf(data.draw(trees(max_joints=6)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        robot = urdfkin.load(text, verify=False)
+    robot = loaded(text, verify=False)
     names = [name for name in lockable(robot) if data.draw(st.booleans())]
     q = robot.sample(1, seed=data.draw(st.integers(0, 99)))[0]
     locked = demand_the_columns(robot, names, q, np.random.default_rng(5))
@@ -155,33 +155,29 @@ def test_any_tree_with_any_joints_locked_is_the_whole_tree_at_these_values(data:
 def test_a_link_may_have_the_name_of_a_locked_joint(
     links: tuple[str, ...], multiplier: float | None, lock: str
 ) -> None:
-    rule = "" if multiplier is None else f'<mimic joint="0" multiplier="{multiplier}"/>'
-    joints = "".join(
-        f'<joint name="{i}" type="revolute"><parent link="{links[i]}"/><child link="{links[i + 1]}"/>'
-        f'<origin xyz="0 0 1"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="1" velocity="1"/>'
-        f"{rule if i else ''}</joint>"
-        for i in range(2)
+    inside = [limit(-3, 3), limit(-3, 3) + ("" if multiplier is None else mimic("0", multiplier))]
+    text = urdfs.robot(
+        *(
+            joint(f"{i}", "revolute", links[i], links[i + 1], 'xyz="0 0 1"', "0 1 0", inside[i])
+            for i in range(2)
+        )
     )
-    text = f'<robot name="r">{"".join(f"<link name={name!r}/>" for name in links)}{joints}</robot>'
     locked_joints = lock if multiplier is None else "0"  # a mimic joint has no value of its own
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # the multiplier is 0
-        locked = urdfkin.load(text).locked(dict.fromkeys(locked_joints, 0.3))
+    locked = loaded(text).locked(dict.fromkeys(locked_joints, 0.3))  # the multiplier is 0
     locked.placement(locked.sample(2), locked.link_frames)
     assert locked.certificate().verified
 
 
 def test_a_slide_that_is_locked_back_to_its_parent_keeps_its_rounding_in_the_bound() -> None:
-    text = """<robot name="r"><link name="a"/><link name="b"/><joint name="s" type="prismatic">
-    <parent link="a"/><child link="b"/><origin xyz="0.1 0.7 -0.3" rpy="0.4 -1.1 2.2"/><axis xyz="AXIS"/>
-    <limit lower="-9" upper="9" effort="1" velocity="1"/></joint></robot>"""
+    origin = 'xyz="0.1 0.7 -0.3" rpy="0.4 -1.1 2.2"'
+    text = urdfs.robot(joint("s", "prismatic", "a", "b", origin, "AXIS", limit(-9, 9)))
     p = np.array([0.1, 0.7, -0.3])
     length = math.hypot(*p)
     axis = rotation_from_rpy([0.4, -1.1, 2.2]).T @ p
     axis /= math.hypot(*axis)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # the axis is a unit vector to rounding only
-        whole = urdfkin.load(text.replace("AXIS", " ".join(map(repr, axis.tolist()))))
+    whole = loaded(
+        text.replace("AXIS", " ".join(map(repr, axis.tolist())))
+    )  # the axis is a unit vector to rounding only
     for value in (-length, np.nextafter(-length, 0.0), 7.3):
         locked = whole.locked({"s": float(value)})
         locked.placement([], "b")
@@ -411,14 +407,13 @@ def test_a_locked_joint_is_named_in_the_errors_about_q() -> None:
 
 
 def test_a_mimic_joint_outside_its_limits_is_refused_unless_no_value_satisfies_it() -> None:
-    text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-    <joint name="x" type="revolute"><parent link="a"/><child link="b"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-    <joint name="y" type="revolute"><parent link="b"/><child link="c"/><mimic joint="x" multiplier="2"/>
-    <limit lower="LOW" upper="9" effort="1" velocity="1"/></joint></robot>"""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        good, impossible = (urdfkin.load(text.replace("LOW", low)) for low in ("0", "3"))
+    leader = joint("x", "revolute", "a", "b", axis="1 0 0", more=limit())
+    good, impossible = (
+        loaded(
+            urdfs.robot(leader, joint("y", "revolute", "b", "c", "", "1 0 0", mimic("x", 2) + limit(low, 9)))
+        )
+        for low in (0, 3)
+    )
     assert good.locked({"x": 0.5}).nq == 0
     with pytest.raises(urdfkin.InputError, match="joint y: -1 is outside"):
         good.locked({"x": -0.5})
@@ -431,9 +426,9 @@ def test_a_lock_only_removes_a_joint_from_the_order_of_another_tool(name: str, c
     robot = urdfkin.load(name, verify=False, mimic=False)
     order = robot.convention(convention).joint_names
     middle = robot.sample(1)[0]
-    for joint in order[::3]:
-        locked = robot.locked({joint: middle[robot.coordinate_names.index(joint)]})
-        assert locked.convention(convention).joint_names == tuple(x for x in order if x != joint)
+    for name_of in order[::3]:
+        locked = robot.locked({name_of: middle[robot.coordinate_names.index(name_of)]})
+        assert locked.convention(convention).joint_names == tuple(x for x in order if x != name_of)
 
 
 def test_a_convention_that_lists_a_locked_joint_leaves_it_out(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 import urdfkin
 from tests.laws.subjects import robot_of
-from tests.reading import tree_of
+from tests.reading import present, tree_of
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import VECTORS
@@ -101,8 +101,7 @@ def robot_that_misreads(text: str, wrong: str) -> Robot:
 @pytest.mark.parametrize("place", ["0.333", "-1.5707963267948966", "0.0825", "0.384"])
 def test_a_number_that_was_misread_in_its_12th_digit_is_caught(place: str) -> None:
     text = urdfkin.load("panda").urdf
-    found = re.search(rf'(?:xyz|rpy)="[^"]*{re.escape(place)}[^"]*"', text)
-    assert found is not None
+    found = present(re.search(rf'(?:xyz|rpy)="[^"]*{re.escape(place)}[^"]*"', text))
     exponent = int(np.floor(np.log10(abs(float(place)))))
     changed = repr(float(place) + 2.0 * 10.0 ** (exponent - 11))
     wrong = text[: found.start()] + found[0].replace(place, changed, 1) + text[found.end() :]

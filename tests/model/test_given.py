@@ -12,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from tests import urdfs
 from tests.robots.odd_urdfs import urdf_of
+from tests.urdfs import joint, limit, mimic
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.errors.numbers import in_radians, parse_quantity
 from urdfkin.model.configuration import places
@@ -22,16 +24,12 @@ from urdfkin.robot import Robot
 #: The limits of echo narrow those of elbow, which a test relies on.
 pytestmark = pytest.mark.filterwarnings("ignore:.*URDF527")
 
-ARM = (
-    '<robot name="arm"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>'
-    '<joint name="lift" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
-    '<limit lower="0" upper="0.5" effort="1" velocity="1"/></joint>'
-    '<joint name="shoulder" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 1 0"/>'
-    '<limit lower="-3.14" upper="3.14" effort="1" velocity="1"/></joint>'
-    '<joint name="elbow" type="revolute"><parent link="c"/><child link="d"/><axis xyz="0 1 0"/>'
-    '<limit lower="0.5" upper="1.5" effort="1" velocity="1"/></joint>'
-    '<joint name="echo" type="revolute"><parent link="d"/><child link="e"/><axis xyz="0 1 0"/>'
-    '<mimic joint="elbow"/><limit lower="-1" upper="1.25" effort="1" velocity="1"/></joint></robot>'
+ARM = urdfs.robot(
+    joint("lift", "prismatic", "a", "b", more=limit(0, 0.5)),
+    joint("shoulder", "revolute", "b", "c", axis="0 1 0", more=limit(-3.14, 3.14)),
+    joint("elbow", "revolute", "c", "d", axis="0 1 0", more=limit(0.5, 1.5)),
+    joint("echo", "revolute", "d", "e", axis="0 1 0", more=mimic("elbow") + limit(-1, 1.25)),
+    name="arm",
 )
 Q = [0.005, math.pi / 6, math.pi / 2]
 
@@ -301,11 +299,10 @@ def test_labels_that_cannot_be_meant_are_refused(given: Any, message: str, arm: 
 
 
 #: A planar joint `a`, whose first coordinate would be called as the joint `a.x` is.
-ALIKE = (
-    '<robot name="alike"><link name="o"/><link name="p"/><link name="s"/>'
-    '<joint name="a" type="planar"><parent link="o"/><child link="p"/><axis xyz="0 0 1"/></joint>'
-    '<joint name="a.x" type="revolute"><parent link="p"/><child link="s"/><origin xyz="1 0 0"/>'
-    '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+ALIKE = urdfs.robot(
+    joint("a", "planar", "o", "p"),
+    joint("a.x", "revolute", "p", "s", 'xyz="1 0 0"', more=limit()),
+    name="alike",
 )
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.reading import present
 from urdfkin.dh import read_table
 from urdfkin.dh.common_normals import left_out
 from urdfkin.dh.compare import compare
@@ -34,8 +35,7 @@ def test_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(name: st
     for leaf in robot.tree.leaves():
         tip = robot.tree.links[leaf]
         table = dh_table(robot.tree, tip, root, convention)
-        check = robot.verifier.table(table, samples=10)
-        assert check is not None
+        check = present(robot.verifier.table(table, samples=10))
         assert check.agrees
         assert max(check.units.values()) <= 20.0 + left_out(robot.chain(tip, root)) / EPS
         reach = float(robot.chain(tip, root).lengths.sum())
@@ -88,8 +88,7 @@ def test_every_cell_of_the_vendors_table_comes_out_of_the_urdf(name: str) -> Non
     np.testing.assert_allclose(table.base, np.eye(4), atol=1e-15)
     np.testing.assert_allclose(table.tool, reference.tool, atol=1e-15)
     if snap:
-        assert table.snap is not None
-        assert table.snap.metres <= metres
+        assert present(table.snap).metres <= metres
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import urdfkin
+from tests.urdfs import loaded
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree, freed, with_tilts
 from urdfkin.robot import Robot
@@ -40,12 +41,6 @@ def snaps(kind: str, axis: FloatArray) -> bool:
 
 def found(kind: str, axis: FloatArray) -> bool:
     return "URDF514" in [finding.code for finding in check(text(kind, axis).encode())]
-
-
-def loaded(document: str) -> Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(document)
 
 
 def near(size: float, seed: int) -> FloatArray:

@@ -1,7 +1,5 @@
 """Robots that no one chose agree with Pinocchio in every quantity, frame and reference."""
 
-import warnings
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +8,7 @@ from hypothesis import strategies as st
 import urdfkin
 from tests.robots.against_pinocchio import ask
 from tests.robots.odd_urdfs import NAMES, random_tree, urdf_of
+from tests.urdfs import loaded
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -21,12 +20,6 @@ pytestmark = pytest.mark.slow
 
 #: Rounding seldom conspires: what is measured stays below this share of the bound, on every robot here.
 USUAL_SHARE = 0.25
-
-
-def load(text: str, **options: str) -> Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(text, root_joint=options.get("root_joint"))
 
 
 def rates(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -52,7 +45,7 @@ def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
 def test_every_quantity_of_every_frame_agrees(name: str) -> None:
     text = urdf_of(name)
     report = urdfkin.validate(text, samples=5).robots[0]
-    assert_verified(report, load(text), samples=5 + 3)
+    assert_verified(report, loaded(text), samples=5 + 3)
 
 
 @pytest.mark.parametrize("root_joint", ["planar", "floating"])
@@ -60,7 +53,7 @@ def test_every_quantity_of_every_frame_agrees(name: str) -> None:
 def test_hung_from_a_root_joint_they_agree_as_well(name: str, root_joint: str) -> None:
     text = urdf_of(name)
     report = urdfkin.validate(text, samples=5, root_joint=root_joint).robots[0]
-    assert_verified(report, load(text, root_joint=root_joint), samples=5 + 3)
+    assert_verified(report, loaded(text, root_joint=root_joint), samples=5 + 3)
 
 
 @pytest.mark.parametrize("reference", list(Reference))
@@ -68,7 +61,7 @@ def test_hung_from_a_root_joint_they_agree_as_well(name: str, root_joint: str) -
 def test_a_robots_calls_give_what_pinocchio_gives_when_asked_directly(
     name: str, reference: Reference
 ) -> None:
-    robot = load(urdf_of(name))
+    robot = loaded(urdf_of(name))
     q, v, a = (x[0] for x in rates(robot, 1, 3))
     frame = robot.tip_frame
     theirs = ask(robot, q, v, a, frame, reference)
@@ -83,7 +76,7 @@ def test_a_robots_calls_give_what_pinocchio_gives_when_asked_directly(
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_call_is_checked_and_the_certificate_counts_it(name: str) -> None:
-    robot = load(urdf_of(name))
+    robot = loaded(urdf_of(name))
     q, v, a = rates(robot, 2, 4)
     frame = robot.tip_frame
     robot.placement(q, frame)
@@ -107,11 +100,11 @@ def test_every_call_is_checked_and_the_certificate_counts_it(name: str) -> None:
 @given(st.integers(1000, 10**9))
 def test_any_tree_agrees(seed: int) -> None:
     text = random_tree(seed)
-    assert_verified(urdfkin.validate(text, samples=10, seed=seed).robots[0], load(text), samples=13)
+    assert_verified(urdfkin.validate(text, samples=10, seed=seed).robots[0], loaded(text), samples=13)
 
 
 def test_a_name_of_two_places_must_be_told_apart_and_then_gives_both() -> None:
-    robot = load(urdf_of("same_names"))
+    robot = loaded(urdf_of("same_names"))
     q = robot.sample(1, 5)[0]
     with pytest.raises(urdfkin.InputError, match=r"write 'link:elbow' or 'joint:elbow'"):
         robot.placement(q, "elbow")
@@ -121,7 +114,7 @@ def test_a_name_of_two_places_must_be_told_apart_and_then_gives_both() -> None:
 
 
 def test_a_prismatic_axis_of_length_two_slides_no_further_than_its_coordinate_says() -> None:
-    robot = load(urdf_of("default_everything"))
+    robot = loaded(urdf_of("default_everything"))
     q = np.zeros(4)
     slide = robot.joint_names.index("joint_2")
     at_rest = robot.placement(q, "link_2")[:3, 3]

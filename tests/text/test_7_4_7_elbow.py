@@ -92,23 +92,16 @@ class Counted:
         return Counted(self.value - other.value)
 
 
-def counted(vector: Any) -> list[Counted]:
-    return [Counted(float(x)) for x in vector]
+def counted(x: Any) -> Any:
+    """An array of such numbers."""
+    return np.vectorize(Counted, otypes=[object])(x)
 
 
-def scaled(factor: float, vector: list[Counted]) -> list[Counted]:
-    return [Counted(factor) * x for x in vector]
+def crossed(x: Any, y: Any) -> Any:
+    return np.array([x[i] * y[j] - x[j] * y[i] for i, j in ((1, 2), (2, 0), (0, 1))])
 
 
-def added(x: list[Counted], y: list[Counted]) -> list[Counted]:
-    return [a + b for a, b in zip(x, y, strict=True)]
-
-
-def crossed(x: list[Counted], y: list[Counted]) -> list[Counted]:
-    return [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
-
-
-def values(columns: list[list[Counted]]) -> FloatArray:
+def values(columns: list[Any]) -> FloatArray:
     return np.array([[x.value for x in column] for column in columns]).T
 
 
@@ -118,8 +111,8 @@ def linear_rows_by_7_110(nonzero: int) -> tuple[FloatArray, int]:
     z, vector, columns = [counted(axis) for axis in Z], counted(np.zeros(3)), []
     for k in range(6, 0, -1):
         row = MOVING.rows[k - 1]
-        own = added(scaled(float(row.d), z[k - 1]), scaled(float(row.a), counted(MOVING.x(k))))
-        vector = added(own, vector)
+        own = z[k - 1] * Counted(float(row.d)) + counted(MOVING.x(k)) * Counted(float(row.a))
+        vector = own + vector
         columns.append(crossed(z[k - 1], vector) if k <= nonzero else counted(np.zeros(3)))
     return values(columns[::-1]), Counted.multiplications
 
@@ -127,11 +120,10 @@ def linear_rows_by_7_110(nonzero: int) -> tuple[FloatArray, int]:
 def linear_rows_by_7_114() -> tuple[FloatArray, int]:
     Counted.multiplications = 0
     z = [counted(axis) for axis in Z]
-    forearm = scaled(D4, z[3])
-    both = added(scaled(A2, counted(X2)), forearm)
+    forearm = z[3] * Counted(D4)
+    both = counted(X2) * Counted(A2) + forearm
     columns = [crossed(z[0], both), crossed(z[1], both), crossed(z[2], forearm)]
-    columns += [counted(np.zeros(3)) for _ in range(3)]
-    return values(columns), Counted.multiplications
+    return values([*columns, *counted(np.zeros((3, 3)))]), Counted.multiplications
 
 
 def test_the_substitution_saves_two_thirds_of_the_multiplications() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.reading import present
 from tests.urdf.lint.cases.arm import LIMIT, arm, fixed
 from urdfkin.robot import Robot
 from urdfkin.verify.verifier import NotVerifiedWarning
@@ -102,8 +103,7 @@ def test_a_chain_of_followers_is_resolved() -> None:
     )
     robot = load(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>', more=third))
     everything(robot)
-    mimic = robot.tree.joints[2].mimic
-    assert mimic is not None
+    mimic = present(robot.tree.joints[2].mimic)
     assert (mimic.leader, mimic.multiplier) == ("j1", -6.0)
     assert mimic.offset == pytest.approx(3 * 0.1 + 0.5)
 
@@ -131,16 +131,14 @@ def test_a_floating_joint_has_seven_coordinates_and_six_rates() -> None:
 def test_limits_of_a_continuous_joint_are_ignored() -> None:
     robot = load(arm(attributes='type="continuous"'))
     everything(robot)
-    limit = robot.tree.joints[0].limit
-    assert limit is not None
+    limit = present(robot.tree.joints[0].limit)
     assert (limit.lower, limit.upper) == (-np.inf, np.inf)
 
 
 def test_a_limit_that_is_not_written_is_zero() -> None:
     robot = load(arm(limit='<limit upper="1" effort="1" velocity="1"/>'))
     everything(robot)
-    limit = robot.tree.joints[0].limit
-    assert limit is not None
+    limit = present(robot.tree.joints[0].limit)
     assert (limit.lower, limit.upper) == (0.0, 1.0)
 
 

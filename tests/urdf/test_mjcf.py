@@ -18,6 +18,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as command
 from tests.urdf.lint.cases.arm import arm
+from tests.urdfs import loaded
 from urdfkin.errors import InputError, OracleError
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.system.processes import ask_python
@@ -57,12 +58,6 @@ TWO = """
   <actuator><motor joint="f"/><position tendon="t"/></actuator>
 </mujoco>
 """
-
-
-def loaded(source: Source, **options: object) -> urdfkin.Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(source, **options)  # type: ignore[arg-type]
 
 
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -23,6 +22,8 @@ pytest.importorskip("pxr")
 
 import urdfkin
 from tests.cli.running import urdfkin as command
+from tests.reading import present
+from tests.urdfs import loaded
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Question
 from urdfkin.errors import InputError, OracleError, SourceError
@@ -50,7 +51,7 @@ def body(name: str, place: str = "", inside: str = "", schemas: str = "") -> str
 
 def joint(
     name: str, kind: str, first: str, second: str, more: str = "", schemas: str = "", *,
-    axis: str = "", limits: Sequence[float] = (), **frames: object,
+    axis: str = "", limits: Sequence[object] = (), **frames: object,
 ) -> str:  # fmt: skip
     """Write a joint between two bodies of /arm; an empty name is the world; `localPos0=(x, y, z)`."""
     words = [f"rel physics:body{i} = </arm/{end}>" for i, end in enumerate((first, second)) if end]
@@ -96,12 +97,6 @@ def read(write: Write) -> Read:
     return lambda content, **options: loaded(write(stage(content, **options)))
 
 
-def loaded(source: Path | str, **options: Any) -> urdfkin.Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(source, **options)
-
-
 def codes(robot: urdfkin.Robot) -> dict[str, str | None]:
     return {finding.code: finding.name for finding in robot.findings if finding.code.startswith("USD")}
 
@@ -138,8 +133,7 @@ def test_the_certificate_states_what_openusd_confirms(read: Read) -> None:
 
 
 def test_limits_are_degrees_and_a_joint_without_limits_is_continuous(read: Read) -> None:
-    limit = read(LINKS + JOINTS).tree.joints[0].limit
-    assert limit is not None
+    limit = present(read(LINKS + JOINTS).tree.joints[0].limit)
     assert (limit.lower, limit.upper) == pytest.approx((-math.pi / 2, math.pi))
     robot = read(body("base") + body("upper") + joint("free", "Revolute", "base", "upper", axis="Z"))
     assert robot.tree.joints[0].kind.value == "continuous"
@@ -149,8 +143,7 @@ def test_limits_are_degrees_and_a_joint_without_limits_is_continuous(read: Read)
 def test_lengths_are_in_the_stages_unit(read: Read, unit: float) -> None:
     robot = read(LINKS + JOINTS, unit=unit)
     assert reach(robot) == pytest.approx(2.0 * unit)
-    limit = robot.tree.joints[1].limit
-    assert limit is not None
+    limit = present(robot.tree.joints[1].limit)
     assert limit.upper == pytest.approx(3.0 * unit)
 
 
@@ -163,8 +156,10 @@ def test_a_stage_with_y_up_is_turned_so_that_z_is_up(read: Read) -> None:
 
 def test_a_joint_frame_counts_on_both_sides(read: Read) -> None:
     turn = (0.70710677, 0, 0, 0.70710677)
-    frames = {"localPos0": (1, 0, 0), "localRot0": turn, "localPos1": (0, 3, 0), "localRot1": turn}
-    offset = joint("j", "Revolute", "base", "tip", axis="X", **frames)
+    offset = joint(
+        "j", "Revolute", "base", "tip", axis="X",
+        localPos0=(1, 0, 0), localRot0=turn, localPos1=(0, 3, 0), localRot1=turn,
+    )  # fmt: skip
     robot = read(body("base", schemas=ROOT) + body("tip", "(1, -3, 0)") + offset)
     assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([1.0, -3.0, 0.0])
     # the axis is the y axis of the base through (1, 0, 0)
@@ -232,8 +227,7 @@ def test_a_d6_joint_with_the_freedoms_of_another_kind_is_that_joint(
 @pytest.mark.parametrize(("free", "factor"), [("rotY", math.pi / 180.0), ("transZ", 0.5)])
 def test_a_d6_joint_keeps_the_limits_of_its_free_direction(read: Read, free: str, factor: float) -> None:
     ends = f"float limit:{free}:physics:low = -45\nfloat limit:{free}:physics:high = 90"
-    limit = read(d6([free], ends, ALL), unit=0.5).tree.joints[0].limit
-    assert limit is not None
+    limit = present(read(d6([free], ends, ALL), unit=0.5).tree.joints[0].limit)
     assert (limit.lower, limit.upper) == pytest.approx((-45 * factor, 90 * factor))
 
 
@@ -979,8 +973,7 @@ def test_openusds_parser_notices_a_slip_of_our_reader(
     side, motion = usd._Reader._side, usd._Reader._motion
 
     def wrong_side(self: Any, prim: Any, i: int, target: str | None) -> Any:
-        found = side(self, prim, 1 - i if slip == "swapped" else i, target)
-        assert found is not None
+        found = present(side(self, prim, 1 - i if slip == "swapped" else i, target))
         T = found[1].copy()
         T[:3, 3] *= 2.0 if slip == "unit" else 1.0
         return found[0], T, *found[2:]

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
 from tests.laws.subjects import NAMES, robot_of, state
+from tests.urdfs import joint, limit, mimic
 from urdfkin.compiled.evaluate import accelerations, placements, velocities
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.kinematics.roundings import EPS, ROUNDINGS, of_joints
@@ -18,13 +20,11 @@ from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.quantities import ACCELERATION, HESSIAN, JACOBIAN, JACOBIAN_RATE, PLACEMENT, VELOCITY
 
 #: A turning joint, one that slides twice as far as the coordinate before it says.
-ARM = """<robot name="r">
-<link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
-<joint name="a" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>
-<joint name="b" type="prismatic"><parent link="l1"/><child link="l2"/><axis xyz="1 0 0"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="c" type="prismatic"><parent link="l2"/><child link="l3"/><axis xyz="1 0 0"/>
-<limit lower="-2" upper="2" effort="1" velocity="1"/><mimic joint="b" multiplier="-2"/></joint></robot>"""
+ARM = urdfs.robot(
+    joint("a", "continuous", "l0", "l1"),
+    joint("b", "prismatic", "l1", "l2", axis="1 0 0", more=limit()),
+    joint("c", "prismatic", "l2", "l3", axis="1 0 0", more=limit(-2, 2) + mimic("b", -2)),
+)
 P, W, VEL, ALPHA, ACC, JOINTS = 3.0, 5.0, 7.0, 11.0, 13.0, 4.0
 LOCAL, WORLD, ALIGNED = Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED
 
@@ -237,13 +237,12 @@ def test_an_imus_reading_has_an_accelerations_factors_in_its_own_axes(
 # The sizes of terms: nothing that is computed exceeds them, and where all terms add up they are reached.
 
 
-LONG_ARM = """<robot name="r">
-<link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/><link name="tip"/>
-<joint name="a" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>
-<joint name="b" type="continuous"><parent link="l1"/><child link="l2"/><origin xyz="2 0 0"/>
-<axis xyz="0 0 1"/></joint><joint name="c" type="prismatic"><parent link="l2"/><child link="l3"/>
-<origin xyz="1 0 0"/><axis xyz="1 0 0"/><limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
-<joint name="d" type="fixed"><parent link="l3"/><child link="tip"/><origin xyz="0.5 0 0"/></joint></robot>"""
+LONG_ARM = urdfs.robot(
+    joint("a", "continuous", "l0", "l1"),
+    joint("b", "continuous", "l1", "l2", 'xyz="2 0 0"'),
+    joint("c", "prismatic", "l2", "l3", 'xyz="1 0 0"', "1 0 0", limit(-9, 9)),
+    joint("d", "fixed", "l3", "tip", 'xyz="0.5 0 0"', axis=""),
+)
 
 
 def length(x: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable
+from functools import reduce
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,8 +15,10 @@ import pytest
 
 import urdfkin
 from scripts.fuzzing import robots
+from tests import urdfs
 from tests.cli.running import Done, process
 from tests.urdf.lint.cases.arm import arm, fixed
+from tests.urdfs import joint, loaded, mimic
 from urdfkin.errors import InstallationError, UnknownNameError
 from urdfkin.model.reference import Reference
 from urdfkin.urdf.catalogue import catalogue
@@ -145,9 +148,7 @@ def ask_everything(robot: urdfkin.Robot, n: int, base: urdfkin.BaseMotion | None
 @pytest.mark.parametrize("far", [None, 1.0, 1e6], ids=lambda far: f"base {far}")
 def test_mujoco_agrees_in_every_quantity_and_reference(name: str, far: float | None) -> None:
     text, options = SUBJECTS[name]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        robot = urdfkin.load(text, oracle="mujoco", **options)
+    robot = loaded(text, oracle="mujoco", **options)
     ask_everything(robot, 5, None if far is None else base_motion(np.random.default_rng(0), far))
     certificate = robot.certificate()
     assert certificate.verified, certificate
@@ -253,25 +254,17 @@ def test_an_oracle_that_is_not_installed_says_what_to_install(monkeypatch: pytes
 # -- yourdfpy reads each URDF a second time, and a different tree is reported --------------------------------
 
 
-ARM = """<robot name="arm">
-<link name="base"/><link name="a"/><link name="b"/><link name="c"/>
-<joint name="turn" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
-  <origin xyz="0.1 0.2 0.3" rpy="0.1 -0.2 2.5"/><limit lower="-1" upper="2" effort="3" velocity="4"/></joint>
-<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/>
-  <limit lower="-1" upper="2" effort="3" velocity="4"/>
-  <mimic joint="turn" multiplier="0.5" offset="0.25"/></joint>
-<joint name="tool" type="fixed"><parent link="b"/><child link="c"/></joint>
-</robot>"""
-
-
-def quiet_load(source: str, **how: Any) -> urdfkin.Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(source, verify=False, **how)
+_ENDS = '<limit lower="-1" upper="2" effort="3" velocity="4"/>'
+ARM = urdfs.robot(
+    joint("turn", "revolute", "base", "a", 'xyz="0.1 0.2 0.3" rpy="0.1 -0.2 2.5"', more=_ENDS),
+    joint("slide", "prismatic", "a", "b", axis="1 0 0", more=_ENDS + mimic("turn", 0.5, 0.25)),
+    joint("tool", "fixed", "b", "c", axis=""),
+    name="arm",
+)
 
 
 def reading(text: str, **how: Any) -> SecondReading:
-    robot = quiet_load(text, **how)
+    robot = loaded(text, verify=False, **how)
     added = robot.root_joint is not None
     return second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic, root_joint=added)
 
@@ -287,7 +280,7 @@ def test_both_readers_agree_on_the_catalogue(name: str) -> None:
 @pytest.mark.slow
 def test_both_readers_agree_on_the_whole_catalogue() -> None:
     for name in catalogue():
-        robot = quiet_load(name)
+        robot = loaded(name, verify=False)
         found = second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic)
         assert (found.differences, found.unread) == ((), None), name
 
@@ -297,53 +290,39 @@ def test_options_of_load_are_no_difference(how: dict[str, Any]) -> None:
     assert reading(ARM, **how).differences == ()
 
 
-def bend(joint: Any) -> None:
-    joint.axis = joint.axis + np.array([0.0, 1e-9, 0.0])
+def more(x: float, *at: int) -> Callable[[Any], Any]:
+    """Return the change of an array at one place."""
+
+    def changed(array: Any) -> Any:
+        array = array.copy()
+        array[at] += x
+        return array
+
+    return changed
 
 
-def shift(joint: Any) -> None:
-    joint.origin = joint.origin.copy()
-    joint.origin[0, 3] += 1e-12
-
-
-def tilt(joint: Any) -> None:
-    joint.origin = joint.origin.copy()
-    joint.origin[0, 0] += 1e-14
-
-
-def widen(joint: Any) -> None:
-    joint.limit.upper = 2.5
-
-
-def hang(joint: Any) -> None:
-    joint.parent = "c"
-
-
-def rename(joint: Any) -> None:
-    joint.name = "other"
-
-
-def change_kind(joint: Any) -> None:
-    joint.type = "continuous"
-
-
-PLANTED: dict[str, tuple[Callable[[Any], None], str]] = {
-    "axis": (bend, "joint turn: axis"),
-    "origin": (shift, "joint turn: origin"),
-    "rotation": (tilt, "joint turn: rotation"),
-    "limit": (widen, "joint turn: limit"),
-    "parent": (hang, "joint turn: from c to a"),
-    "name": (rename, "joint turn: 0 times, not 1"),
-    "kind": (change_kind, "joint turn: type continuous, not revolute"),
+#: Attribute of the joint that yourdfpy reads, its change, and the words about it.
+PLANTED: dict[str, tuple[str, Callable[[Any], Any], str]] = {
+    "axis": ("axis", more(1e-9, 1), "joint turn: axis"),
+    "origin": ("origin", more(1e-12, 0, 3), "joint turn: origin"),
+    "rotation": ("origin", more(1e-14, 0, 0), "joint turn: rotation"),
+    "limit": ("limit.upper", lambda _: 2.5, "joint turn: limit"),
+    "parent": ("parent", lambda _: "c", "joint turn: from c to a"),
+    "name": ("name", lambda _: "other", "joint turn: 0 times, not 1"),
+    "kind": ("type", lambda _: "continuous", "joint turn: type continuous, not revolute"),
 }
 
 
-def plant(monkeypatch: pytest.MonkeyPatch, fault: Callable[[Any], None], index: int = 0) -> None:
+def plant(
+    monkeypatch: pytest.MonkeyPatch, attribute: str, change: Callable[[Any], Any], index: int = 0
+) -> None:
     right = second_reader.read
 
     def wrong(text: str) -> Any:
         robot = right(text)
-        fault(robot.joints[index])
+        *owners, name = attribute.split(".")
+        owner = reduce(getattr, owners, robot.joints[index])
+        setattr(owner, name, change(getattr(owner, name)))
         return robot
 
     monkeypatch.setattr(second_reader, "read", wrong)
@@ -351,22 +330,19 @@ def plant(monkeypatch: pytest.MonkeyPatch, fault: Callable[[Any], None], index: 
 
 @pytest.mark.parametrize("what", PLANTED)
 def test_a_planted_difference_is_reported(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    fault, words = PLANTED[what]
-    plant(monkeypatch, fault)
+    *fault, words = PLANTED[what]
+    plant(monkeypatch, *fault)  # type: ignore[arg-type]
     assert any(words in text for text in reading(ARM).differences)
 
 
 def test_a_different_mimic_rule_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    def double(joint: Any) -> None:
-        joint.mimic.multiplier *= 2.0
-
-    plant(monkeypatch, double, 1)
+    plant(monkeypatch, "mimic.multiplier", lambda x: 2.0 * x, 1)
     (difference,) = reading(ARM).differences
     assert difference.startswith("joint slide: mimic rule")
 
 
 def test_a_bent_axis_fails_the_validation(monkeypatch: pytest.MonkeyPatch) -> None:
-    plant(monkeypatch, bend)
+    plant(monkeypatch, *PLANTED["axis"][:2])
     report = validate(ARM, samples=0)
     (robot,) = report.robots
     assert robot.verdict is Verdict.DISAGREES
@@ -394,12 +370,12 @@ def test_a_file_that_yourdfpy_cannot_read_is_named_and_is_no_failure(monkeypatch
 
 
 def test_a_document_type_is_not_given_to_yourdfpy() -> None:
-    found = second_reading("<!DOCTYPE robot>" + ARM, quiet_load(ARM).tree)
+    found = second_reading("<!DOCTYPE robot>" + ARM, loaded(ARM, verify=False).tree)
     assert found.unread == "the file has a document type"
 
 
 def test_the_declared_encoding_of_the_file_does_not_matter() -> None:
     assert reading(ARM.replace("turn", "drehen_ä")).differences == ()
     declared = '<?xml version="1.0" encoding="latin-1"?>' + ARM.replace("turn", "drehen_ä")
-    tree = quiet_load(ARM.replace("turn", "drehen_ä")).tree
+    tree = loaded(ARM.replace("turn", "drehen_ä"), verify=False).tree
     assert second_reading(declared, tree).differences == ()

@@ -11,7 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from tests import urdfs
 from tests.high_precision import mp
+from tests.urdfs import joint, limit
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
@@ -256,12 +258,10 @@ def test_what_is_beyond_all_numbers_bounds_nothing() -> None:
 
 
 #: A joint that turns, one that slides outward from it; at slide 0 the frame lies on the first one's axis.
-SLIDE = (
-    '<robot name="slide"><link name="a"/><link name="b"/><link name="c"/>'
-    '<joint name="turn" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
-    '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
-    '<joint name="slide" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="1 0 0"/>'
-    '<limit lower="0" upper="2" effort="1" velocity="1"/></joint></robot>'
+SLIDE = urdfs.robot(
+    joint("turn", "revolute", "a", "b", more=limit(-3, 3)),
+    joint("slide", "prismatic", "b", "c", axis="1 0 0", more=limit(0, 2)),
+    name="slide",
 )
 
 
@@ -419,13 +419,7 @@ def test_an_explanation_leaves_the_certificate_verified() -> None:
 
 
 def test_an_arm_that_is_singular_everywhere_is_not_explained_by_its_configuration() -> None:
-    links = "".join(f'<link name="l{i}"/>' for i in range(6))
-    joint = (
-        '<joint name="j{0}" type="continuous"><parent link="l{0}"/><child link="l{1}"/>'
-        '<origin xyz="0.3 0 0"/><axis xyz="0 0 1"/></joint>'
-    )
-    joints = "".join(joint.format(i, i + 1) for i in range(5))
-    robot = urdfkin.load(f'<robot name="row">{links}{joints}</robot>')
+    robot = urdfkin.load(urdfs.chain([""] * 5, origin='xyz="0.3 0 0"'))
     one = found(robot, [0.1, 0.2, 0.3, 0.4, 0.5])
     assert (one.rank, one.full, len(one.lost), len(one.motions)) == (3, 5, 0, 2)
     assert one.reasons == (

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urdfkin
+from tests.reading import present
 from tests.urdf.lint.cases import CASES
 from tests.urdf.lint.cases.arm import Case, arm, axis, limit
 from urdfkin.system.files import Edit
@@ -186,17 +187,15 @@ def test_a_rounded_pi_turns_no_frame_by_more_than_its_fix_says() -> None:
     rough = arm(origin='<origin xyz="0 0 0.3" rpy="1.5708 0 -3.1416"/>')
     done = mended(rough)
     (finding,) = done.fixed
-    assert finding.fix is not None
     a, b = (urdfkin.load(data) for data in (rough, done.text.data))
     R_a, R_b = (robot.placement(robot.neutral(), "l1")[:3, :3] for robot in (a, b))
     turned = math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0)
-    assert 0.0 < turned <= finding.fix.turns < 1.2e-5
+    assert 0.0 < turned <= present(finding.fix).turns < 1.2e-5
 
 
 def test_the_differences_that_are_looked_for_are_all_there_are() -> None:
     """Every field of a joint's record is held against the other, or says where it stands in the file."""
-    record = examine(read_source(arm())).robot
-    assert record is not None
+    record = present(examine(read_source(arm())).robot)
     joint = record.joints[0]
     places = {"element", "axis_element", "origin_element"}
     changed: dict[str, Any] = {

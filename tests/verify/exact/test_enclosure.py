@@ -15,11 +15,14 @@ import pytest
 from numpy.typing import NDArray
 
 import urdfkin
+from tests import urdfs
 from tests.attacks.test_judged_quaternions import quaternions, text
 from tests.high_precision import mp, true_motion
 from tests.laws.everything import by_the_robot
 from tests.laws.subjects import robot_of, state
 from tests.laws.test_mutation import with_a_slip
+from tests.reading import present
+from tests.urdfs import joint, limit, mimic
 from urdfkin import BaseMotion, Reference
 from urdfkin.errors import InputError, NotFiniteError, UnknownNameError
 from urdfkin.kinematics.rotation import exp_rotation
@@ -166,12 +169,10 @@ def test_what_an_equation_gives_that_is_slightly_wrong_leaves_the_interval(
 
 
 #: Lengths that are doubles, and joints that slide along coordinate axes.
-GANTRY = (
-    '<robot name="gantry"><link name="a"/><link name="b"/><link name="c"/>'
-    '<joint name="x" type="prismatic"><parent link="a"/><child link="b"/><origin xyz="0.5 0.25 0"/>'
-    '<axis xyz="2 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-    '<joint name="y" type="prismatic"><parent link="b"/><child link="c"/><origin xyz="0 0 0.1"/>'
-    '<axis xyz="0 3 4"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+GANTRY = urdfs.robot(
+    joint("x", "prismatic", "a", "b", 'xyz="0.5 0.25 0"', "2 0 0", limit()),
+    joint("y", "prismatic", "b", "c", 'xyz="0 0 0.1"', "0 3 4", limit()),
+    name="gantry",
 )
 
 
@@ -219,24 +220,18 @@ def test_a_hessian_is_enclosed_where_it_is_asked_for(name: str) -> None:
     motion = true_motion(robot, x)
     assert robot.enclose(*x, robot.tip_frame).hessian is None
     for reference in Reference:
-        one = robot.enclose(*x, robot.tip_frame, reference, hessian=True).hessian
-        assert one is not None
+        one = present(robot.enclose(*x, robot.tip_frame, reference, hessian=True).hessian)
         assert holds(one, QUANTITIES["hessian"].truth(motion, link, reference))
         assert ((one.width <= 2.0 * np.spacing(np.abs(one.upper))) | (one.width < 1e-25)).mean() > 0.8
         assert one.error(robot.hessian(x[0], robot.tip_frame, reference)).max() < 1e-14
 
 
 #: A joint that turns, one that follows it by -2.5 and one that follows that by 0.3.
-FOLLOWERS = (
-    '<robot name="followers"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>'
-    '<joint name="x" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
-    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-    '<joint name="y" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.5 0.1 0"/>'
-    '<axis xyz="0 1 0"/><mimic joint="x" multiplier="-2.5" offset="0.2"/>'
-    '<limit lower="-3" upper="3" effort="1" velocity="3"/></joint>'
-    '<joint name="z" type="prismatic"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0.2"/>'
-    '<axis xyz="1 0 0"/><mimic joint="y" multiplier="0.3"/>'
-    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+FOLLOWERS = urdfs.robot(
+    joint("x", "revolute", "a", "b", more=limit()),
+    joint("y", "revolute", "b", "c", 'xyz="0.5 0.1 0"', "0 1 0", mimic("x", -2.5, 0.2) + limit(-3, 3)),
+    joint("z", "prismatic", "c", "d", 'xyz="0.3 0 0.2"', "1 0 0", mimic("y", 0.3) + limit()),
+    name="followers",
 )
 
 
@@ -246,8 +241,7 @@ def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipl
 ) -> None:
     robot = urdfkin.load(FOLLOWERS)
     q, v, a = np.array([0.3]), np.array([1.0]), np.array([0.5])
-    one = robot.enclose(q, v, a, "d", reference, hessian=True).hessian
-    assert one is not None
+    one = present(robot.enclose(q, v, a, "d", reference, hessian=True).hessian)
     assert one.error(robot.hessian(q, "d", reference)).max() < 1e-14
     # The rate of the Jacobian by the robot's own recursion: with one rate, J-dot = H v.
     motion = true_motion(robot, (q, v, a))
