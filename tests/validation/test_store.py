@@ -127,13 +127,13 @@ def test_changed_code_never_meets_old_results_and_its_digest_is_of_what_computes
         (package / place).parent.mkdir(parents=True)
         (package / place).write_text("1")
     monkeypatch.setattr(results, "_PACKAGE", package)
-    before = results._code()
+    digest = results._code()
     (package / "cli" / "validate.py").write_text("2")
-    assert results._code() == before
+    assert results._code() == digest
     for place in ("kinematics/equations.py", "urdf/lint/rules/joints.toml"):
         (package / place).write_text("2")
-        assert results._code() != before
-        before = results._code()
+        assert results._code() != digest
+        digest = results._code()
 
 
 def test_a_changed_file_is_not_taken_for_what_it_was_and_another_folder_is_left_alone(tmp_path: Path) -> None:
