@@ -61,34 +61,30 @@ def one_line(text: str) -> str:
 # -- standard streams --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("words", ["robots", "--help", "--version", "explain URDF101", "info ur5"])
-def test_a_full_standard_output_is_told_in_a_line(words: str) -> None:
-    code, _, err = shell(f"$URDFKIN {words} > /dev/full")
-    assert code == 2
-    assert "standard output: cannot be written: found No space left on device" in one_line(err)
+FULL = "standard output: cannot be written: found No space left on device"
+CLOSED = "standard output: cannot be written: found Bad file descriptor"
+#: A line of a shell, its exit code, and what is in the only line of standard error.
+STREAMS = {
+    **{f"{words} > /dev/full": (2, FULL) for words in ("robots", "--help", "--version", "info ur5")},
+    "explain URDF101 > /dev/full": (2, FULL),
+    **{f"{words} >&-": (2, CLOSED) for words in ("robots", "--help", "info ur5")},
+    "info - <&-": (2, "standard input: cannot be read: found Bad file descriptor"),
+    **{f"info nothing_of_this_name {closed}": (2, "") for closed in ("2>&-", "2>/dev/full", "2>&- >&-")},
+}
 
 
-@pytest.mark.parametrize("words", ["robots", "--help", "info ur5"])
-def test_a_closed_standard_output_is_told_in_a_line(words: str) -> None:
-    code, _, err = shell(f"$URDFKIN {words} >&-")
-    assert code == 2
-    assert "standard output: cannot be written: found Bad file descriptor" in one_line(err)
+@pytest.mark.parametrize("line", STREAMS)
+def test_a_stream_that_is_full_or_closed_is_told_in_a_line(line: str) -> None:
+    code, words = STREAMS[line]
+    found, out, err = shell(f"$URDFKIN {line}")
+    assert (found, out) == (code, "")
+    assert words in (one_line(err) if words else "")
 
 
-def test_a_closed_standard_output_is_no_matter_where_a_file_is_written_and_a_closed_input_is_told(
-    tmp_path: Path,
-) -> None:
+def test_a_closed_standard_output_is_no_matter_where_a_file_is_written(tmp_path: Path) -> None:
     code, _, err = shell("$URDFKIN placement ur5 -o T.csv >&-", tmp_path)
     assert code == 0, err
     assert (tmp_path / "T.csv").read_text().startswith("sample,T00")
-    code, out, err = shell("$URDFKIN info - <&-")
-    assert (code, out) == (2, "")
-    assert "standard input: cannot be read: found Bad file descriptor" in one_line(err)
-
-
-@pytest.mark.parametrize("closed", ["2>&-", "2>/dev/full", "2>&- >&-"])
-def test_a_standard_error_that_takes_nothing_changes_no_exit_code(closed: str) -> None:
-    assert shell(f"$URDFKIN info nothing_of_this_name {closed}")[0] == 2
 
 
 @pytest.mark.parametrize("words", ["robots", "--help", "explain 7.130"])

@@ -98,6 +98,7 @@ def test_the_check_of_a_file_passes_under_any_names(robot: Robot, to: str) -> No
     assert "hacked" not in scope
 
 
+@pytest.mark.long  # a compiler takes seconds for each header
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
 def test_cudas_header_declares_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None:
     written = code(robot, quantities=("placement",))

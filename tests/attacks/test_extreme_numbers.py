@@ -3,6 +3,7 @@
 import math
 import shlex
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,7 +54,10 @@ def numbers(rng: np.random.Generator, exponent: int, size: int) -> FloatArray:
 def everything(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None) -> int:
     """Every quantity of the last link in every reference; how many leave the range of doubles."""
     beyond = 0
-    methods = [(robot.placement, q), *((x, q) for x in (robot.jacobian, robot.hessian))]
+    methods: list[tuple[Any, ...]] = [
+        (robot.placement, q),
+        *((x, q) for x in (robot.jacobian, robot.hessian)),
+    ]
     methods += [(x, q, v) for x in (robot.velocity, robot.jacobian_rate)]
     methods += [(x, q, v, a) for x in (robot.acceleration, robot.acceleration_breakdown)]
     for reference in REFERENCES:

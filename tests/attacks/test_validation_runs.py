@@ -218,15 +218,11 @@ def test_an_interrupt_keeps_what_had_finished_and_drops_what_waits(
             raise KeyboardInterrupt
         return run_chunk(chunk)
 
-    class Now(Executor):
-        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-            future = Future[Any]()
-            future.set_result(fn(*args, **kwargs))
-            return future
-
     monkeypatch.setattr(engines, "IN_FLIGHT", 1)
     monkeypatch.setattr(answer, "run_chunk", interrupted)
-    report = validate(ROBOTS, samples=60, executor=None if way == "here" else Now())
+    report = validate(
+        ROBOTS, samples=60, executor=None if way == "here" else Refusing(10**6, when_asked=True)
+    )
     assert ran[-1] == ("ur5", 1)
     assert report.interrupted
     first, second, third = report.robots

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,10 @@ from tests.cli.running import good, refused, urdfkin
 from tests.cli.test_trajectory_option import write
 from tests.laws.test_imu import moving_base
 from urdfkin.model.tree import FloatArray
+
+
+def save(path: Path, **arrays: Any) -> None:
+    np.savez(path, **arrays)
 
 
 @pytest.fixture
@@ -28,7 +33,7 @@ def test_a_csv_file_and_an_archive_of_the_same_motion_give_the_librarys_numbers(
     robot = library.load("ur5")
     q, v, a = (motion[x] for x in "qva")
     expected = robot.imu(q, v, a, "tool0", gravity=[0.0, 1.0, -9.8])
-    np.savez(tmp_path / "log.npz", **motion)
+    save(tmp_path / "log.npz", **motion)
     write(tmp_path / "log.csv", robot, motion)
     for log in ("log.csv", "log.npz"):
         words = ["imu ur5 --frame tool0 --gravity 0,1,-9.8 --trajectory", str(tmp_path / log)]
@@ -49,12 +54,12 @@ def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_ar
     base = moving_base(4, 3)
     fields = {f"base_{name}": getattr(base, name) for name in ("placement", "velocity", "acceleration")}
     path = tmp_path / "log.npz"
-    np.savez(path, **motion, **fields)
+    save(path, **motion, **fields)
     words = ["imu", "ur5", "--frame", "tool0", "--trajectory", str(path), "--format", "json"]
     q, v, a = (motion[x] for x in "qva")
     expected = library.load("ur5").imu(q, v, a, "tool0", base=base)
     assert json.loads(urdfkin(*words).out)["result"] == expected.tolist()
-    np.savez(path, q=motion["q"])
+    save(path, q=motion["q"])
     done = good(*words)
     assert "rates by central differences" in done.err
 
@@ -79,7 +84,7 @@ def test_an_archive_of_anything_else_is_refused_in_one_line(
     arrays: dict[str, FloatArray], words: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.npz"
-    np.savez(path, **arrays)
+    save(path, **arrays)
     err = refused("imu ur5 --trajectory", str(path))
     assert words in err
     assert str(path) in err
@@ -96,7 +101,7 @@ def test_what_is_no_archive_is_refused_too(data: bytes, tmp_path: Path) -> None:
 def test_options_without_effect_and_half_a_vector_are_refused(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
-    np.savez(tmp_path / "log.npz", **motion)
+    save(tmp_path / "log.npz", **motion)
     assert "--v does nothing along a --trajectory" in refused(
         "imu ur5 --trajectory", str(tmp_path / "log.npz"), "--v", "random"
     )

@@ -71,9 +71,8 @@ def test_every_command_that_takes_joint_values_has_a_convention_and_of_a_batch_a
     found = commands_with("q", "trajectory", "poses")
     assert {*COMMANDS, "placement", "chain", "plot", "view", "calibrate"} <= found.keys()
     assert [name for name, given in found.items() if "convention" not in given] == []
-    of_one_configuration = {"chain"}
-    found = commands_with("q").items()
-    assert {name for name, given in found if "trajectory" not in given} == of_one_configuration
+    batches = commands_with("q").items()
+    assert {name for name, given in batches if "trajectory" not in given} == {"chain"}, "one configuration"
 
 
 @pytest.mark.parametrize("command", ["placement", *COMMANDS])

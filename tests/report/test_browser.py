@@ -148,7 +148,7 @@ def test_links_and_tables_are_drawn_where_the_robot_has_them(
             np.testing.assert_allclose(np.reshape(drawn, (4, 4)), expected, atol=1e-5)
 
 
-def test_the_overview_sorts_both_ways_filters_rows_and_leads_to_robots(browser: Browser) -> None:
+def test_the_overview_sorts_both_ways_and_filters_rows(browser: Browser) -> None:
     results = browser.probe("heads").index("results")
     for order in ("descending", "ascending"):
         assert browser.probe("sortBy", results) == order
@@ -161,6 +161,9 @@ def test_the_overview_sorts_both_ways_filters_rows_and_leads_to_robots(browser: 
     assert browser.probe("column", 0) == ["ur5", "panda"]
     assert browser.probe("find", "UR") == ["1 of 2", [True, False]]
     assert browser.probe("find", "") == ["2 of 2", [False, False]]
+
+
+def test_a_link_unfolds_its_robot(browser: Browser) -> None:
     browser.js("document.querySelectorAll('#overview a')[1].click()")
     browser.settle()
     assert browser.js("return document.querySelector('#robot-1').open")

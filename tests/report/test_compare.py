@@ -106,7 +106,7 @@ def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_however_little_it_i
     assert changed[start + "axis"].new == "-z, rotated by 3.142 rad"
     assert changed[start + "origin"].new.endswith(": moved by 250 mm, rotated by 0 rad")
     assert changed[start + "upper limit"].new == "1.5"
-    new: Any = arms()
+    new = arms()
     joint = new["robots"][1]["model"]["joints"][2]
     joint["placement"][2][3] += 1e-11
     joint["axis"] = [0.0, math.sin(1e-11), math.cos(1e-11)]
@@ -123,8 +123,7 @@ def test_a_joint_that_follows_another_way_is_gone_or_new_is_told() -> None:
     (told,) = model_changes(old["robots"][1]["model"], new["robots"][1]["model"])
     assert told[0].endswith(", mimic rule")
     assert told[1:] == ("none", "-2 * wheel +0.25")
-    old: Any = arms()
-    new: Any = arms()
+    old, new = arms(), arms()
     new["robots"][1]["model"]["joints"][2]["name"] = "other"
     name = old["robots"][1]["model"]["joints"][2]["name"]
     lines = words(arms(), new)

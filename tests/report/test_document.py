@@ -35,7 +35,7 @@ def test_every_report_keeps_to_the_schema(make: Any) -> None:
 
 @pytest.mark.slow
 def test_every_other_run_keeps_to_the_schema_which_describes_everything() -> None:
-    document = validate(REFUSED, samples=1).as_dict()
+    document: Any = validate(REFUSED, samples=1).as_dict()
     assert errors(document) == []
     robot = document["robots"][0]
     assert robot["verdict"] == "bad input"
@@ -43,7 +43,7 @@ def test_every_other_run_keeps_to_the_schema_which_describes_everything() -> Non
     assert {finding["severity"] for finding in robot["findings"]} >= {"error"}
     report = validate("panda", samples=0)
     judged = replace(report, judgements=(judge(load("panda"), samples=1),))
-    document: Any = judged.as_dict()
+    document = judged.as_dict()
     assert errors(document) == []
     assert len(document["robots"][0]["judge"]["lines"]) > 5
     strict = copy.deepcopy(VALIDATION.schema())

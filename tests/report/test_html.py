@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.markup import Page
-from tests.report.documents import HOSTILE_JOINT, HOSTILE_LINK, HOSTILE_ROBOT, arms, failing, hostile
+from tests.report.documents import arms, failing, hostile
 from urdfkin.report import html as html_module
 from urdfkin.report import pages
 from urdfkin.report.figures import distributions
@@ -94,17 +94,6 @@ def test_tables_agree_on_the_page_as_far_as_their_share_of_the_bound_allows() ->
     text = as_html(document)
     assert text.count("Both tables agree with Pinocchio") == 1
     assert text.count("The tables disagree with Pinocchio") == len(chains) - 1
-
-
-@pytest.mark.parametrize("name", [HOSTILE_ROBOT, HOSTILE_JOINT, HOSTILE_LINK])
-def test_hostile_names_are_text_and_nothing_else(name: str) -> None:
-    hostile_page = page("hostile")
-    assert len(hostile_page.all("script")) == len(page("arms").all("script"))
-    assert hostile_page.all("img") == []
-    assert " ".join(name.split()) in hostile_page.text
-    inline = next(script for script in hostile_page.scripts if '"links"' in script)
-    assert not set("<>&\u2028") & set(inline)
-    assert HOSTILE_LINK in json.loads(inline)["links"]
 
 
 def test_plots_and_pictures_have_words_for_who_cannot_see_them() -> None:

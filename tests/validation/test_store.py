@@ -127,13 +127,13 @@ def test_changed_code_never_meets_old_results_and_its_digest_is_of_what_computes
         (package / place).parent.mkdir(parents=True)
         (package / place).write_text("1")
     monkeypatch.setattr(results, "_PACKAGE", package)
-    before = results._code()
+    digest = results._code()
     (package / "cli" / "validate.py").write_text("2")
-    assert results._code() == before
+    assert results._code() == digest
     for place in ("kinematics/equations.py", "urdf/lint/rules/joints.toml"):
         (package / place).write_text("2")
-        assert results._code() != before
-        before = results._code()
+        assert results._code() != digest
+        digest = results._code()
 
 
 def test_a_changed_file_is_not_taken_for_what_it_was_and_another_folder_is_left_alone(tmp_path: Path) -> None:
@@ -282,24 +282,20 @@ def test_a_renamed_chunk_is_reported_and_put_aside(undisturbed: str, tmp_path: P
     assert numbers(stored(tmp_path)) == undisturbed
 
 
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"", "not a JSON file"),
-        (b"{}", "not a file with the layout urdfkin-campaign/1"),
-        (b"[]", "not a file with the layout urdfkin-campaign/1"),
-        (b"\xff", "not a JSON file"),
-        (b'{"schema": "urdfkin-campaign/2"}', "unknown version of the layout urdfkin-campaign"),
-        (b'{"schema": "urdfkin-campaign/1"}', r"does not conform to the layout .*: found \$: .*`robots`"),
-        (b"null", "not a file with the layout urdfkin-campaign/1"),
-    ],
-)
-def test_a_manifest_that_is_none_is_refused(content: bytes, said: str, tmp_path: Path) -> None:
+OTHER = "not a file with the layout urdfkin-campaign/1"
+MANIFESTS = {
+    b"": "not a JSON file", b"\xff": "not a JSON file", b"{}": OTHER, b"[]": OTHER, b"null": OTHER,
+    b'{"schema": "urdfkin-campaign/2"}': "unknown version of the layout urdfkin-campaign",
+    b'{"schema": "urdfkin-campaign/1"}': r"does not conform to the layout .*: found \$: .*`robots`",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("content", MANIFESTS)
+def test_a_manifest_that_is_none_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_bytes(content)
-    with pytest.raises(InputError, match=said):
-        stored(tmp_path)
-    with pytest.raises(InputError, match=said):
-        validate("ur5", samples=0, store=tmp_path)
+    for ask in (stored, lambda store: validate("ur5", samples=0, store=store)):
+        with pytest.raises(InputError, match=MANIFESTS[content]):
+            ask(tmp_path)
 
 
 @pytest.mark.parametrize(
