@@ -9,7 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from scripts.mutate import PACKAGE, ROOT, Mutant, argued, files, judge, main, module_of, mutants, near_tests
+from scripts.mutate import (
+    COMPILED,
+    PACKAGE,
+    ROOT,
+    Mutant,
+    argued,
+    files,
+    judge,
+    main,
+    module_of,
+    mutants,
+    near_tests,
+)
 from scripts.mutating.operators import function_at, mutated, slips
 
 SOURCE = '''
@@ -57,6 +69,11 @@ def test_a_slip_changes_one_place_and_each_changes_another() -> None:
 
 
 @pytest.mark.long
+def test_the_files_that_numba_compiles_exist_and_no_other_file_is_left_out() -> None:
+    left_out = {path.relative_to(PACKAGE).as_posix() for path in {*PACKAGE.rglob("*.py")} - {*files([])}}
+    assert left_out == COMPILED
+
+
 def test_every_slip_of_the_package_compiles_and_has_a_test_to_ask() -> None:
     for path in files([]):
         tree = ast.parse(path.read_text(encoding="utf-8"))
