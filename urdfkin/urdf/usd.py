@@ -45,7 +45,7 @@ from urdfkin.model.tree import (
     inverse,
     pose,
 )
-from urdfkin.system.files import MOST
+from urdfkin.system.files import MOST, read_start
 from urdfkin.system.lazy_import import install_remedy, installed_version
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.mjcf import UNBOUNDED
@@ -219,7 +219,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
                     "the files of this stage are too large", where=where, found=f"over {MOST} bytes"
                 )
             files[outer] = None
-        if _starts_with(outer, _LFS):
+        if read_start(Path(outer), len(_LFS)) == _LFS:
             raise InputError(
                 "this file is a pointer of Git LFS, not USD", where=outer, remedy="run git lfs pull"
             )
@@ -285,11 +285,6 @@ def _refused(what: str, where: str, found: str) -> InputError:
         found=found[:200],
         remedy="copy the file beside the stage, or flatten the stage: usdcat --flatten",
     )
-
-
-def _starts_with(path: str, text: bytes) -> bool:
-    with open(path, "rb") as file:  # noqa: PTH123  not every name is a path
-        return file.read(len(text)) == text
 
 
 def _size(path: str, where: str) -> int:

@@ -21,7 +21,7 @@ from urdfkin.model.configuration import Samples, draw
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.validation import memory
-from urdfkin.validation.comparison import SecondWitness, tallies
+from urdfkin.validation.comparison import SecondOracleModel, tallies
 from urdfkin.validation.error_stats import Key, Tally
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import RobotSummary
@@ -155,10 +155,10 @@ def chunks(subject: RobotInput, samples: int, seed: int, most: int | None = None
 #: Cache of the latest robot.
 #: A worker gets the chunks of a robot one after another, and reads the robot only once.
 #: Two large robots at a time would need too much memory.
-_cache: dict[RobotInput, tuple[Robot, Oracle, SecondWitness | None]] = {}
+_cache: dict[RobotInput, tuple[Robot, Oracle, SecondOracleModel | None]] = {}
 
 
-def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondWitness | None]:
+def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondOracleModel | None]:
     if (found := _cache.get(chunk.subject)) is not None:
         return found
     _cache.clear()
@@ -167,7 +167,7 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondWitness | None]:
     memory.demand(robot.tree, chunk.samples + SPECIAL, most)  # the first chunk is the largest
     second = None
     if (by := robot.verifier.library) is not PINOCCHIO:
-        second = SecondWitness(by, robot.verifier.oracle(by=by))
+        second = SecondOracleModel(by, robot.verifier.oracle(by=by))
     found = robot, robot.verifier.oracle(), second
     _cache[chunk.subject] = found
     return found

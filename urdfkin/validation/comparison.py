@@ -32,7 +32,7 @@ BLOCK_BYTES = 32 * 2**20
 
 
 @dataclass(frozen=True, slots=True)
-class SecondWitness:
+class SecondOracleModel:
     """A second oracle besides Pinocchio, and its model of the robot."""
 
     library: OracleLibrary
@@ -57,7 +57,7 @@ def tallies(
     x: Samples,
     first_sample: int,
     clock: Clock,
-    second: SecondWitness | None = None,
+    second: SecondOracleModel | None = None,
 ) -> dict[Key, Tally]:
     """Compare the results for all frames and joints of a robot with the oracle's results.
 
@@ -132,7 +132,7 @@ class _Block(_Work):
         self.joint_rows = [link - frames.start for link in moving[joints]]
         self.joint_names = robot.joint_names[joints]
 
-    def tallies(self, second: SecondWitness | None) -> Iterator[tuple[Key, Tally]]:
+    def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
         """Yield the error statistics of each quantity.
 
         The result of a joint is the result of its child link. Pinocchio computes the two results with
@@ -166,7 +166,7 @@ class _Block(_Work):
         reference: Reference | None,
         ours: FloatArray,
         bound: Bound,
-        second: SecondWitness | None,
+        second: SecondOracleModel | None,
     ) -> tuple[Key, Tally]:
         names = self.joint_names if row.of == "joints" else self.frames
         theirs = self.clock.theirs(row.ask, self.oracle, self.asked(row, reference))
