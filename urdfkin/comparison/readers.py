@@ -27,11 +27,11 @@ from urdfkin.verify.adapters import LIBRARIES, version
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Largest difference between two poses that count as equal, if positions are at most 1 m; for larger
-#: positions, a multiple of this number. Libraries that compute in double precision differ by less than 1e-13.
-#: A misread element causes a larger difference.
+#: Two poses count as equal if they differ by at most this number. If positions are larger than 1 m, the
+#: number is multiplied by the largest position in metres. Libraries that compute in double precision differ
+#: by less than 1e-13. A misread element causes a larger difference.
 _EQUAL = 1e-9
-#: The same for libraries that compute in single precision.
+#: For libraries that compute in single precision: largest difference between two poses that count as equal.
 _EQUAL_SINGLE = 1e-5
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
@@ -104,7 +104,7 @@ def compare_readers(
     """Compare how libraries read a robot's file with how urdfkin reads it.
 
     Args:
-        robot: The robot. All its links are compared at q = 0 and at random configurations.
+        robot: The robot. The poses of all links are compared at q = 0 and at random configurations.
         libraries: Names of libraries (`installed`); by default all installed libraries that read the format.
         samples: Number of random configurations.
         seed: Seed of the configurations.
@@ -221,7 +221,7 @@ def _source(robot: Robot) -> tuple[str, str]:
 
 
 def _without_shapes(text: str) -> str:
-    """Return a URDF text without meshes and other shapes, which some libraries look for on disk."""
+    """Return a URDF text without shapes, because some libraries search the disk for the files of meshes."""
     from xml.etree.ElementTree import tostring  # noqa: PLC0415
 
     robot = plain_xml(text)

@@ -77,8 +77,8 @@ def same(
 
     By the product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H, the motion of a link depends on the
     screws S_i of the joints and on the link's pose H in the zero configuration. If the screws and poses of
-    two models agree, the models move alike for all q. The models may still differ in the base's pose, fixed
-    links, joint zeros and senses, names, the order of coordinates, and tool frames.
+    two models agree, the models move alike for all q. The models may still have different base poses, fixed
+    links, joint zeros, joint directions, names, coordinate orders and tool frames.
 
     Args:
         a: A robot, or a source for `load`.
@@ -116,7 +116,7 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
-    # A comparison makes many compiled trees. They are stored in copies, not in the user's robots.
+    # A comparison stores many compiled trees in the two robots, so it works on copies of the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 
@@ -283,7 +283,7 @@ class Comparator:
     def unexplained(self, found: Alignment) -> tuple[JointDifference, ...]:
         """Return the differences of the models as they are written, joint by joint, beyond rounding.
 
-        The models are compared in both orders, because a bound depends on the link from which a joint is seen
+        The function compares A with B and also B with A, because the two comparisons have different bounds
         (`urdfkin.comparison.single`).
         """
         off = [
@@ -301,13 +301,11 @@ class Comparator:
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
     def as_written(self, found: Alignment) -> Alignment:
-        """Return the alignment of the models as they are written, for the joint and link pairs of `found`.
+        """Return the alignment of the unchanged models, with the joint and link pairs of `found`.
 
-        No sense, zero, tool or base is changed in this alignment, and the roots of the two models coincide.
-
-        The roots may have different names, and one model may also have a link with the name of the other
-        model's root. Then the two links of that name coincide instead. If one model is a Denavit-Hartenberg
-        table, only links with equal names count, because the poses of the other links depend on the table's
+        No joint direction, joint zero, tool frame or base pose is changed in this alignment.
+        `base_as_written` computes the pose of B's root. If one model is a Denavit-Hartenberg table, only
+        links with equal names are compared, because the poses of the table's other links depend on its
         convention.
         """
         a, b = self.mechanisms
@@ -340,9 +338,9 @@ class Comparator:
         return Search(self.robots, found, variables)
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
-        """Return the distance and angle (m, rad) between frames that ignored rounding differences can cause.
+        """Bound the distance and the angle (m, rad) between two frames that differ only by rounding.
 
-        Each joint can differ by a little rounding, and these differences add up along the path.
+        `same` ignores a small rounding difference at each joint, and these differences add up along the path.
 
         For a joint without limits, the sum uses the range in which the joint is sampled.
         """
@@ -385,7 +383,7 @@ class Comparator:
     ) -> tuple[float, float]:
         """Return one bound (m, rad) for all frames.
 
-        The bound is sharpened only if the proof of `within` needs it.
+        The function improves the bound only if the improved bound can prove the distance `within`.
         """
         metres, radians = self.rounding(written, variables)
         uppers = self._uppers(written, variables)
@@ -508,7 +506,7 @@ def _fixed_here(
     Args:
         tree: The tree.
         other: The other tree.
-        names: For each joint with another name in the other tree: that name.
+        names: For each joint with different names in the two trees: its name in the other tree.
         labels: A label for each link of both trees.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
@@ -531,9 +529,9 @@ def _with_idle_joints_fixed(
 ) -> KinematicTree:
     """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
 
-    Such a joint never moves. A mimic joint remains a mimic joint if the other model has a moving joint with
-    its name, above its child link, or with the name of `names`: then the two rules are compared. The
-    arguments are those of `_fixed_here`.
+    A joint with the multiplier 0 never moves. It remains a mimic joint if the other model has a matching
+    joint that moves: then `same` compares the two joints. Joints match by name (`names`), or by the label of
+    their child link. The arguments are described in `_fixed_here`.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     children = {labels[1][i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv}
@@ -551,11 +549,11 @@ def _with_idle_joints_fixed(
 def _spelled_alike(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Return a label for each link of two models, and pairs of joints with another spelling in USD.
+    """Return link labels of two models, and pairs of joints whose names differ only by USD's spelling.
 
-    A USD file contains another spelling of each name that USD does not allow, and several spellings are
-    possible. A name in the USD file counts as a spelling of a name in the other model if no second name of
-    that model has the same spelling.
+    USD does not allow all names, so a USD file contains other spellings of some names. Several spellings are
+    possible. A name in the USD file is matched to a name of the other model, unless a second name of the
+    other model has the same spelling.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -571,7 +569,7 @@ def _spelled_alike(
 
 
 def _originals(names: Sequence[str], spelt: Sequence[str]) -> dict[str, str]:
-    """For each name in the USD file that is another spelling of a name in `names`, return the latter."""
+    """Map each name that the USD file spells differently to the original name in `names`."""
     known, found = set(spelt), dict[str, set[str]]()
     for name in names:
         if name not in known:
@@ -581,10 +579,10 @@ def _originals(names: Sequence[str], spelt: Sequence[str]) -> dict[str, str]:
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of B's root in A's root frame for models that are compared as they are written.
+    """Return the pose (4, 4) of B's root in A's root frame, if the two models are not changed.
 
-    The roots may have different names, and one model may also have a link with the name of the other model's
-    root. Then the two links of that name coincide. Otherwise the two roots coincide.
+    The root body of one model may contain a link with the name of the other model's root. Then the two links
+    of this name coincide. Otherwise, the two roots coincide.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.homes[link])

@@ -33,10 +33,10 @@ HEADS = ("frame", "at least", "at most", "angle at most")
 TURNED = ("radians_seen", "radians")
 #: The default question: are the two robots equivalent?
 EQUIVALENT = Question()
-#: A distance is not printed if its bound is at most this factor times the rounding error of one number. The
-#: factor is larger than 1 because a sum adds the rounding errors of its terms.
+#: A distance is printed only if its bound is larger than DUST times the rounding error. DUST is larger than 1
+#: because the sum of several terms has additional rounding errors.
 DUST = 1.001
-#: Heading of the list of joints whose mimic joints leave their limits.
+#: Heading of the list of joints with mimic joints that can exceed their own limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -146,9 +146,9 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return in words the distance between a frame of A and a frame of B, without changes of B.
+    """Return a text with the distance between a frame of A and the frame of the unchanged model B.
 
-    Return an empty text if the distance is within rounding.
+    The text is empty if the distance is within rounding.
     """
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
@@ -441,7 +441,7 @@ def _bones(robot: Robot, Ts: FloatArray) -> FloatArray:
 
 
 def _axes(T: FloatArray, size: float) -> FloatArray:
-    """Return the axes of a frame as lines (3, 2, 3)."""
+    """Return the start and end points (3, 2, 3) of lines that show the three axes of a frame."""
     origin = np.tile(T[:3, 3], (3, 1))
     return np.stack((origin, origin + size * T[:3, :3].T), axis=1)
 
@@ -454,7 +454,7 @@ def _draw(
     The lines of the view are projected along the direction of view and scaled to the size of the picture.
     """
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # The rows are the vectors in space that point right and down on the page.
+    # The first row is the direction in space that points right on the page; the second row points down.
     seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

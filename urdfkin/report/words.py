@@ -126,8 +126,8 @@ def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
 def nearer_counts(lines: Sequence[Judged]) -> str:
     """Return text that compares the errors of urdfkin and Pinocchio in the accuracy study.
 
-    The text contains the number of rows in which urdfkin's typical error is smaller than Pinocchio's. It also
-    contains the numbers of rows with equal errors and with a larger error.
+    The text contains three counts of lines of the study: urdfkin's typical error is smaller than Pinocchio's,
+    equal, or larger.
     """
     counts = Counter(nearer(line) for line in lines)
     return (
@@ -139,7 +139,8 @@ def nearer_counts(lines: Sequence[Judged]) -> str:
 def judged_on(judgement: Judgement) -> str:
     """Return a text about the result of the accuracy study.
 
-    The text states the number of samples, whether the base moved, and the numbers of `nearer_counts`.
+    The text states the number of samples and whether the base moved. It also contains the text of
+    `nearer_counts`.
     """
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
