@@ -418,8 +418,7 @@ def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
 
 
 def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Yield a change for each finding code (such as an error code) whose number of findings changed.
-    """
+    """Yield a change for each finding code (such as an error code) whose number of findings changed."""
     counts: list[dict[str, int]] = [{}, {}]
     for count, robot in zip(counts, (old, new), strict=True):
         for finding in robot["findings"]:

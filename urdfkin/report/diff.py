@@ -64,8 +64,7 @@ def pairs_markdown(found: Sequence[Changes]) -> str:
 
 
 def lines_of(found: Changes) -> list[str]:
-    """Return a line for each change, and a line for each changed joint: the distance by which it moves a
-    frame."""
+    """Return the changes as lines; a changed joint also has a line with the distance that a frame moves."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
     for element, changes in _by_element(found).items():
         lines += [f"  {change}" for change in changes]

@@ -50,8 +50,7 @@ def moving_names(model: Model) -> list[str]:
 
 
 def column_names(model: Model) -> list[str]:
-    """Return the joint name of each Jacobian column; in this Jacobian, mimic joints have their own
-    columns."""
+    """Return the joint name of each Jacobian column, if mimic joints have their own columns."""
     return [joint["name"] for joint in model["joints"] for _ in range(_size(joint)[1])]
 
 

@@ -36,8 +36,9 @@ class Failure:
         reason: The reason as text.
         portrait: Summary of the robot, with only the parts of the robot that could be read.
         error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the process or the cluster caused the failure, and not the robot. Such a failure is
-            not stored, so that a resumed run computes the chunk again.
+        passing: Whether the cause of the failure is the process or the cluster instead of the robot. A
+            failure of the process or the cluster is not stored, so that a resumed run computes the chunk
+            again.
     """
 
     verdict: Verdict
@@ -140,7 +141,7 @@ def unpacked(key: str, content: bytes) -> dict[str, Any]:
     """Return the data in the bytes of a file.
 
     Raises:
-        DamagedError: The bytes differ from those that `packed` returned for this key.
+        DamagedError: The content is damaged or belongs to another key.
     """
     checksum, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
     if not content.startswith(_MAGIC):

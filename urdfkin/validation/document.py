@@ -40,7 +40,7 @@ class Mimic(TypedDict):
 class Kept(TypedDict):
     """The part of a joint's range in which its mimic joints are within their limits.
 
-    The value is null if there is no such part.
+    Both ends are null if the mimic joints exceed their limits everywhere in the range.
     """
 
     lower: Annotated[
@@ -378,7 +378,8 @@ class Timings(TypedDict):
 
 
 class SecondReading(TypedDict):
-    """Comparison of urdfkin's tree with the tree that a second reader makes from the same text."""
+    """Comparison of urdfkin's tree of links and joints with the tree that yourdfpy reads from the same
+    text."""
 
     by: Annotated[str, says("Name and version of the second reader.")]
     joints: Annotated[Count, says("Number of joints compared in both readings, fixed joints included.")]
@@ -426,7 +427,8 @@ class Robot(TypedDict):
 class Document(Header):
     """The output of `urdfkin validate --json`.
 
-    Within a version of the layout, entries may be added, but no entry is removed or changes its meaning.
+    New entries may be added in the same version of the layout. An entry is removed or changes its meaning
+    only in a new version.
     """
 
     started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]

@@ -32,8 +32,8 @@ class Row:
 
     Attributes:
         robot: Index of the robot; -1 before the first task was taken.
-        index: Index of the latest chunk that was taken. A lower index means that more chunks of the robot are
-            left.
+        index: Index of the latest chunk that was taken. The lower this index, the more chunks of the robot
+            remain.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
@@ -91,7 +91,7 @@ class WorkQueue:
         return task
 
     def put_back(self, task: Task, row: Row) -> None:
-        """Put a task back into its `Row`, so that another worker can run it."""
+        """Put a task back into its robot's remaining tasks (`row`), so that another worker can run it."""
         row.put_back(task)
         self._begun.remove(row)
         self._waiting = chain([row], self._waiting)

@@ -1,8 +1,9 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
-A `Tally` contains the statistics of one quantity in one reference frame. Tallies of different samples can be
-added. The addition is commutative and associative, so the sum does not depend on the division of the samples
-into chunks. If two worst cases have the same ratio, the sum contains the case with the earlier sample.
+A `Tally` contains the statistics of one quantity in one reference frame. Two tallies can be added if they
+belong to different samples. The addition is commutative and associative, so the sum does not depend on the
+division of the samples into chunks. A sum of two tallies keeps the worse of the two worst cases. If both are
+equally bad, the sum keeps the case with the smaller sample number.
 
 With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
 Each pair of libraries has a bound. Two results agree if their difference lies within the bound of their pair.
@@ -131,8 +132,8 @@ def three_sides(
 def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArray, FloatArray]:
     """Return two arrays (n, frames) of disagreements.
 
-    In the first array the disagreements are divided by their bounds. In the second array they are in eps *
-    scale.
+    The first array contains the ratios of disagreement to bound. The second array contains the disagreements
+    in eps * scale.
     """
     units = worst_of_each(one, other, bound.scale, 2)
     share: FloatArray = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
@@ -212,7 +213,7 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Combine the statistics of other frames with the statistics of these frames.
+        """Return the common statistics of the frames in `self` and the frames in `other`.
 
         The two tallies must belong to the same samples.
         """

@@ -1,9 +1,9 @@
 """Check a function of a user against urdfkin, the oracle and the derived bound.
 
 The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
-function at random configurations, at the zero configuration and at the joint limits. First, urdfkin's results
-at these configurations are compared with the oracle's results. If they agree, the function is the cause of
-any later disagreement.
+function at random configurations, at the zero configuration and at the joint limits. First, the module
+compares urdfkin's results at these configurations with the oracle's results. If urdfkin and the oracle agree,
+but the function disagrees with urdfkin, the error is in the function.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ _AT_A_TIME = 256
 _DIAGNOSED = 48
 #: Largest number of exceptions and wrong shapes that are stored with their message.
 _KEPT = 5
-#: If the relative difference is at most this number, the diagnosis is "the function rounds to single
-#: precision".
+#: If a function's results differ from urdfkin's by this relative amount or less, the diagnosis is "the
+#: function rounds to single precision".
 _SINGLE = 1e-5
 
 
@@ -114,15 +114,15 @@ class FunctionCheck(Displayable):
         factor: The bound is multiplied by this factor.
         eps_scale: Largest difference in multiples of eps * scale.
         share: Largest ratio of a difference to the bound times `factor`; at most 1 if all results agree.
-        oracle_share: As `share`, for the difference between the function and the oracle. None without an
-            oracle.
+        oracle_share: Largest ratio of the difference between the function and the oracle to the bound times
+            `factor`. None without an oracle.
         rows: Largest ratio in each row of the result, by name.
         columns: Largest ratio in each column of a Jacobian; the key is the name of the joint velocity. Empty
             for other quantities.
         worst: The worst result; None if no result was compared.
         errors: Number of exceptions and wrong shapes.
-        first_errors: The texts of the first of these errors.
-        diagnoses: Explanations of a disagreement. Each explanation alone explains all results.
+        first_errors: The first exceptions and wrong shapes, with their texts.
+        diagnoses: Explanations of a disagreement. Each of these explanations is sufficient for all results.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -234,7 +234,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A wrapper of a robot's verifier. It also stores each checked call with its result."""
+    """A wrapper of a robot's verifier that also stores the arguments and the result of each checked call."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -538,9 +538,10 @@ class _Run:
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
         """Return the rounding errors of a conversion, in eps * scale; they are 0 for a permutation.
 
-        The function receives an angle that the conversion has rounded. This angle differs from urdfkin's
-        angle by up to 2 eps |q|. The joint's rotation matrix, which is a factor of each term, is therefore
-        rotated by up to this angle. The matrix that converts a base velocity has at most 16 roundings.
+        The conversion rounds each joint angle before it is passed to the user's function. The rounded angle
+        differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix is rotated by
+        up to 2 eps |q|, and this matrix is a factor of each term of the result. The conversion of a base
+        velocity by a matrix has at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.how.row
         assert conversion is not None

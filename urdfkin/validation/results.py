@@ -179,9 +179,9 @@ class RobotReport:
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
     """Return the command that computes a case again."""
     row = QUANTITIES[quantity]
-    # Joints are compared under their plain names, and a link may have the same name as a joint.
+    # The name of a joint can also be the name of a link, so the prefix "joint:" marks the joint.
     frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
-    origin = replace(origin, oracle=None)  # the command compares with Pinocchio, as this check does
+    origin = replace(origin, oracle=None)  # the command compares the result with Pinocchio
     return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
 
@@ -240,8 +240,8 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The command that repeats the run.
 
-        Each set of options has its own line. A robot that was passed as text is read from standard input.
-        Each such robot therefore has its own line.
+        Robots with the same options are on the same line. The command reads a robot that was passed as text
+        from standard input, so each of these robots has a line of its own.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(

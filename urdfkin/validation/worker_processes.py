@@ -46,7 +46,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            theirs.close()  # the worker now has the only copy, so the pipe closes when the worker ends
+            theirs.close()  # only the worker has this end of the pipe, so the pipe closes when the worker ends
 
     @property
     def alive(self) -> bool:
@@ -115,7 +115,7 @@ def serve(pipe: int, parent: int) -> None:
 def _receive(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
     """Receive the next chunks while an earlier chunk is computed.
 
-    This process therefore detects at once that its parent has ended.
+    If the parent ends, the connection breaks, and this process ends at once.
     """
     try:
         while True:
