@@ -98,7 +98,7 @@ class Search:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) pose in A's root frame at which B's base link is placed; this pose moves with A's base link.
+        #: (4, 4) pose of B's base link in A's root frame. If A's base link moves, this pose moves with it.
         self.hold = found.X @ found.b.homes[found.base[1]]
         #: For each robot: whether the base link belongs to the same rigid body as the root link.
         self.stands = tuple(
@@ -164,7 +164,7 @@ class Search:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the same as `poses`, but for given configurations (n, nq) of A and of B.
 
-        `computed` is the function that computes placements.
+        `computed` is the function that computes the poses of the frames.
         """
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
@@ -191,7 +191,7 @@ class Search:
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
     def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (n, frames) between matching frame origins (m); arguments as for `poses`."""
+        """Return the distances (n, frames) between the origins of matching frames (m)."""
         return self.at(*self.configurations(z), frames, own_results)
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
@@ -308,7 +308,7 @@ _Vectors = tuple[Support, Support]
 def curvature(
     steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Return the variables' names, and bounds (variables, variables) of the second derivatives of D, metres.
+    """Return the variables' names, and bounds (m) on the second derivatives of D by each pair of variables.
 
     All bounds are inf unless each variable moves the two joints of a matched pair by the same factor.
     """
@@ -406,7 +406,7 @@ TOGETHER = 2**16
 class Boxes:
     """Upper bounds on the distance between a frame's origin in A and in B.
 
-    Each bound holds for a box of configurations.
+    A box is a range for each variable. Each bound is valid for all configurations in one box.
 
     Args:
         search: The search, which contains both robots.

@@ -164,7 +164,7 @@ class Confirmed(TypedDict):
 
 
 class Certificate(Header):
-    """A statement whether two models are the same robot, with the data that prove it, in m and rad."""
+    """A statement whether two models are the same robot, with the data for a proof. Units are m and rad."""
 
     a: Model
     b: Model

@@ -35,7 +35,7 @@ from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source, Text, is_usd
 from urdfkin.urdf.writer import to_urdf
 
-#: Attributes in a URDF that consist of several numbers, each with the names of its numbers.
+#: URDF attributes that consist of several numbers. The value lists the names of these numbers.
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
 #: Default values of a joint's attributes, for attributes that the file omits.
 _DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
@@ -202,7 +202,7 @@ def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
 
 
 def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[Change]:
-    """Yield the differences of the joints, then all other differences, then names and remarks."""
+    """Yield the differences of the joints first, then all other differences, then names and remarks."""
     for at in found.unexplained:
         if at.what and at.a is None:
             yield Change(at.place, at.what, None, None, str(at.b))

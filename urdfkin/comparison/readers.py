@@ -35,7 +35,7 @@ _EQUAL = 1e-9
 _EQUAL_SINGLE = 1e-5
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
-#: Largest answer of a library, in bytes.
+#: Maximum number of bytes that a library's process may return.
 _MOST = 400_000_000
 #: Longest quotation of a library's message, in characters.
 _QUOTED = 200
@@ -49,7 +49,8 @@ class Difference:
         joint: Name of the joint.
         element: Element of the file that explains the difference.
         words: The difference in words.
-        size: Largest difference of the child's pose in the parent link (m, and entries of a rotation).
+        size: Largest difference of an entry of the child link's pose in the parent link (m, or rotation
+            entry).
     """
 
     joint: str
@@ -60,7 +61,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class LibraryReading:
-    """How a library reads a robot file.
+    """The differences between a library and urdfkin in reading a robot file.
 
     Attributes:
         library: Name of the library.
@@ -265,8 +266,8 @@ def _explained(
 ) -> tuple[str, str]:
     """Return the element that explains a difference, and the difference in words.
 
-    T (urdfkin) and `found` (library) are the poses of the child link in the parent link; the first pose is at
-    q = 0.
+    `T` contains urdfkin's poses of the child link in the parent link, and `found` the library's. The first
+    pose is the pose at q = 0.
     """
     off = np.abs(T - found)
     name, words = f"type {joint.kind.value}", "has no coordinate for it"

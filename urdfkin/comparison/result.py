@@ -135,7 +135,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The parameter's value in A and in B, each as a number or in words; None if there is none."""
+        """The parameter's values in A and in B, as numbers or words. None for a model without a value."""
         if self.what == "limits":
             return _range(self.a), _range(self.b)
         if self.what == "idle":
@@ -304,7 +304,7 @@ class Sameness(Displayable):
         verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, `UP_TO_SINGLE`, or `DIFFERS`.
         after: The changes that bring B closest to A, with one line of text for each change. The changes are
             listed even if the models still differ after these changes.
-        up_to: The kinds of the changes in `after`: "base", "zeros", "senses", "free joints", "tools".
+        up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
         differences: The differences, ordered from the base to the tips.
         remarks: Differences that do not affect motion: joint limits, joint types, and links that only one
             model has.
@@ -312,7 +312,7 @@ class Sameness(Displayable):
         links: The matched links of A and B.
         tools: Pairs of matched links with different poses on the same rigid body. `same` reports the two
             links as different tools.
-        orders: Groups of consecutive joints that B has in another order than A. The motion of the robot does
+        orders: Groups of consecutive joints whose order differs between A and B. The motion of the robot does
             not depend on the order of these joints.
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The pose is the identity
             if the two roots coincide.
@@ -483,10 +483,10 @@ class Sameness(Displayable):
         return int(not self.holds(Question(within, strict)))
 
     def to_b(self, q: ArrayLike) -> FloatArray:
-        """Return B's configurations (..., nq) for A's configurations (..., nq).
+        """Convert A's configurations (..., nq) to the corresponding configurations (..., nq) of B.
 
-        At these configurations A and B have the same poses, except for `base`. Coordinates that only B has
-        get their values in the neutral configuration.
+        At corresponding configurations, A and B have the same poses, except for `base`. Coordinates that only
+        B has get their values in the neutral configuration.
 
         Raises:
             InputError: q does not have A's length.
@@ -847,7 +847,7 @@ def remarks(
     *,
     as_written: bool = False,
 ) -> tuple[Difference, ...]:
-    """Return the differences without effect on motion: joint limits, joint types, links of one model only.
+    """Return the differences that do not affect motion: joint limits, joint types, links of only one model.
 
     Args:
         found: The alignment of the models.

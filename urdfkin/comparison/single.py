@@ -103,7 +103,7 @@ class JointComparison:
         self.pairs = {frame.a: frame.b for frame in found.frames}
         self.steps = {step.a: step for step in found.steps}
         back = {b: a for a, b in self.pairs.items()}
-        #: The links at which the paths begin.
+        #: The link of A and the link of B at which the compared paths begin.
         self.start = (0, self.pairs[0]) if 0 in self.pairs else (back.get(0, 0), 0)
         self.pairs[self.start[0]] = self.start[1]
 
@@ -202,7 +202,7 @@ class JointComparison:
             which: 0 for A, 1 for B.
             back: The fixed joints from the last common link to the reference link. Results are in the frame
                 of this link.
-            path: The joints from the last common link to the end.
+            path: The joints from the last common link to the end of the path.
         """
         tree = self.mechanisms[which].tree
         start, own = np.eye(4), np.zeros(2)
@@ -240,7 +240,7 @@ class JointComparison:
             yield JointDifference(place, what, None, " and ".join(sizes), explained)
 
     def _of_free_joint(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
-        """Compare a planar or floating joint, which must be the only joint of the root body.
+        """Compare a planar or floating joint, which must be attached to the root body.
 
         Yield its differences.
         """

@@ -478,7 +478,7 @@ class Comparator:
         return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(off.max(initial=0.0)))
 
     def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
-        """Return each frame's largest distance (m) from Pinocchio at `CONFIRMED` configurations."""
+        """Return each frame's largest distance (m) at `CONFIRMED` configurations, by Pinocchio."""
         search = self.search(found, variables)
         q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
         return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))

@@ -139,7 +139,7 @@ class History:
 
     @property
     def exit_code(self) -> int:
-        """0 if every file was used, else 2."""
+        """The exit code: 0 if every file was used, otherwise 2."""
         return 2 if self.unusable else 0
 
     def as_dict(self, command: str | None = None) -> HistoryDocument:

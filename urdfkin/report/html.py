@@ -170,7 +170,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
 
 
 def _summary(robot: Robot, index: int) -> dict[str, Any]:
-    """Return the data for the heading of a robot's section, which is visible while the section is closed."""
+    """Return the data for the heading of a robot's section; a closed section shows only its heading."""
     opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
     return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
 

@@ -29,7 +29,7 @@ SHOWN = 12
 #: This line is printed if the models differ and their joints were not matched by name.
 GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
 HEADS = ("frame", "at least", "at most", "angle at most")
-#: Names of two attributes of `Interval`: the largest angle found, and the proven bound on the angle.
+#: Two attributes of `Interval`: the largest angle that was found, and the proven bound on the angle.
 TURNED = ("radians_seen", "radians")
 #: The default question: are the two robots equivalent?
 EQUIVALENT = Question()
@@ -120,7 +120,7 @@ def _off(frame: Interval, rounding: tuple[float, float]) -> str:
 
 
 def far_frames(found: Sameness) -> list[Interval]:
-    """Return the frames that may differ between A and B by more than rounding, the farthest first."""
+    """Return the frames whose bound exceeds rounding, the frame with the largest bound first."""
     return sorted(
         (
             frame
@@ -235,7 +235,7 @@ def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str,
 
 
 def pairs_document(found: Sequence[Sameness], question: Question = EQUIVALENT) -> TextDocument:
-    """Return a table of several pairs of models, and the first difference of each pair that differs."""
+    """Return a table of several pairs of models, followed by a line for each pair that differs."""
     rows = _pair_rows(found, question)
     different = [
         f"{one.sources[0]} and {one.sources[1]}: {headline(one, question)}"
@@ -451,7 +451,7 @@ def _draw(
 ) -> dict[str, Any]:
     """Return one view.
 
-    The lines of the view are projected along the direction of view and scaled to the size of the picture.
+    The lines are projected along the viewing direction, and scaled to the size of the picture.
     """
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
     # The first row is the direction in space that points right on the page; the second row points down.

@@ -177,7 +177,7 @@ def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[st
 def second_oracle_cells(checks: Sequence[Check], title: str) -> list[str]:
     """Return the cells under `second_oracle_heads` for several checks.
 
-    For a pair of libraries, the cell contains the largest disagreement divided by its bound.
+    The cell of a pair of libraries contains the largest ratio of a disagreement to its bound.
     """
     found = [(check, check["second_oracle"]) for check in checks if "second_oracle" in check]
     return [

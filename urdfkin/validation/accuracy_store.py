@@ -79,7 +79,10 @@ class AccuracyResult:
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
-        """Return the results with the latest settings. None: no accuracy study was requested."""
+        """Return the results of the accuracy study that has the latest settings.
+
+        None: no accuracy study was requested.
+        """
         try:
             if (content := read_if_there(store.folder / JUDGE)) is None:
                 return None

@@ -115,7 +115,7 @@ def read(key: str, content: bytes) -> Answer:
     """Return the answer of a chunk from the bytes of its file.
 
     Raises:
-        DamagedError: The bytes are not the answer that was written for this chunk.
+        DamagedError: The file is damaged, or belongs to another chunk.
     """
     body = unpacked(key, content)
     try:

@@ -64,8 +64,8 @@ def validate(
 ) -> ValidationReport:
     """Compare every frame and joint with Pinocchio in all three reference frames.
 
-    `urdfkin.verify.quantities.compared()` lists the compared quantities, and `not_compared()` all other
-    quantities.
+    `urdfkin.verify.quantities.compared()` lists the quantities that are compared, and `not_compared()` lists
+    all other quantities.
 
     Args:
         robots: One robot or several: anything that `load` accepts, or loaded robots.
@@ -183,7 +183,7 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _is_robot(subject: RobotInput) -> bool:
-    """Return whether a robot can be loaded; if it cannot, its chunk reports the error."""
+    """Return whether a robot can be loaded. If not, the robot's first chunk reports the error."""
     try:
         subject.load()
     except Exception:

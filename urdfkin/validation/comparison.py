@@ -27,7 +27,7 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 
-#: Maximum size of one array of a block, bytes. About ten arrays of this size exist at a time.
+#: Maximum number of bytes of one array in a block of frames. About ten arrays of this size exist at a time.
 BLOCK_BYTES = 32 * 2**20
 
 
@@ -87,7 +87,7 @@ def frame_bytes(samples: int, nv: int) -> int:
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items of `size` bytes each into slices of at most `BLOCK_BYTES`.
+    """Divide `count` items into slices of at most `BLOCK_BYTES`, if each item has `size` bytes.
 
     Return at least one slice.
     """
@@ -109,7 +109,7 @@ class _Work:
 
 
 class _Block(_Work):
-    """The comparisons for a block of frames.
+    """The comparisons of urdfkin with the oracles for a block of frames.
 
     The block includes each joint whose child link is in the block.
     """

@@ -46,13 +46,13 @@ Inputs = tuple[FloatArray, ...]
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The data for a diagnosis: the function's results and urdfkin's results.
+    """The function's results and urdfkin's results, in which `diagnose` looks for common mistakes.
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
         found: The function's results (n, ...).
         expected: urdfkin's results.
-        scale: The scale of the bound of each number in `expected`.
+        scale: The scale in the bound k * eps * scale of each number in `expected`.
         compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
 
@@ -136,7 +136,7 @@ class Mistakes:
 
     @property
     def exchanged_halves(self) -> str:
-        """A sentence which states that the linear and angular halves of a six-vector are exchanged.
+        """A sentence for the mistake that the linear and the angular rows are exchanged.
 
         The sentence is empty if the quantity has no linear and angular halves.
         """
@@ -145,7 +145,7 @@ class Mistakes:
 
     @property
     def expected_halves(self) -> str:
-        """A sentence which states whether the linear or the angular rows come first in the convention."""
+        """A sentence that states which rows come first in the convention: the linear or the angular rows."""
         tool = "urdfkin" if self.conversion is None else self.conversion.convention.name
         return f"{tool} has the {'angular' if self._angular_first else 'linear'} rows first"
 
@@ -208,7 +208,7 @@ class Mistakes:
         yield "the term J a is missing", partial(case.compute, (q, v, zero))
 
     def _velocity(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the frame's velocity with the row order and the reference frame of the function."""
+        """Return the frame's velocity in the function's reference frame and row order."""
         q, v = self._ours((q, v))
         assert self.reference is not None
         found = self.robot.velocity(q, v, self.frame, self.reference, verify=False)
@@ -276,10 +276,9 @@ class Mistakes:
         return [(q, v) for _, q, v, turns in self._axes() if turns]
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return the data of each joint with one coordinate.
+        """Return a tuple (name, index in q, index in v, is an angle) for each joint with one coordinate.
 
-        The data of a joint are its name, its index in q, its index in v, and whether its coordinate is an
-        angle.
+        The indices are indices in the function's convention.
         """
         tree = self.robot.tree
         found = []

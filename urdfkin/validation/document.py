@@ -378,8 +378,7 @@ class Timings(TypedDict):
 
 
 class SecondReading(TypedDict):
-    """Comparison of urdfkin's tree of links and joints with the tree that yourdfpy reads from the same
-    text."""
+    """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
 
     by: Annotated[str, says("Name and version of the second reader.")]
     joints: Annotated[Count, says("Number of joints compared in both readings, fixed joints included.")]

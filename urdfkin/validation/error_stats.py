@@ -6,9 +6,9 @@ division of the samples into chunks. A sum of two tallies keeps the worse of the
 equally bad, the sum keeps the case with the smaller sample number.
 
 With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
-Each pair of libraries has a bound. Two results agree if their difference lies within the bound of their pair.
-The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two results
-agree and the third one agrees with neither of them, the third one is the outlier.
+Each of the three pairs of libraries has its own bound. Two results agree if their difference lies within the
+bound of their pair. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two
+pairs. If two results agree and the third one agrees with neither of them, the third one is the outlier.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_of_each
 
-#: The three compared libraries, in the order of columns. The last library is the second oracle.
+#: The three compared libraries, in the order of the columns of tables.
 SIDES = ("urdfkin", "pinocchio", "second_oracle")
 
 
@@ -173,12 +173,13 @@ class Tally:
     """Error statistics of one quantity in one reference frame.
 
     Attributes:
-        results: Number of compared results; each is a matrix or a six-vector.
+        results: Number of compared results. A result is a matrix or a six-vector.
         failed: Number of results outside their bound.
         worst: The largest disagreement, in eps * scale.
         share: The largest ratio of a disagreement to its bound.
-        histogram: (82,) number of results in each bin. The first bin is below the first of `HISTOGRAM_EDGES`,
-            the last bin is above the last edge, and the others are between adjacent edges.
+        histogram: (82,) number of results in each bin of the histogram. The first bin contains results below
+            the first of `HISTOGRAM_EDGES`, and the last bin contains results above the last edge. Each other
+            bin is between two adjacent edges.
         by_frame: The largest disagreement of each frame, in the robot's order.
         case: The sample with the largest ratio.
         bounds: The smallest and the largest bound of all results, in eps * scale. The bound for a frame grows

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
-#: Number of configurations that are computed together, and number of configurations for a diagnosis.
+#: Configurations are computed in batches of `_AT_A_TIME`. A diagnosis uses `_DIAGNOSED` configurations.
 _AT_A_TIME = 256
 _DIAGNOSED = 48
 #: Largest number of exceptions and wrong shapes that are stored with their message.
@@ -84,7 +84,7 @@ class WorstResult:
     replay: str
 
     def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
-        """Return a sentence about the worst number, whose difference divided by its bound is largest."""
+        """Return a sentence about the number with the largest ratio of difference to bound."""
         with np.errstate(all="ignore"):
             over = np.abs(self.found - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
         flat = int(np.nan_to_num(over, nan=np.inf).argmax())
@@ -98,7 +98,7 @@ class WorstResult:
 
 @dataclass(frozen=True)
 class FunctionCheck(Displayable):
-    """The differences between a function's results, urdfkin's and the oracle's, relative to the bound.
+    """Result of `verify_function`: how far a function's results are from urdfkin's and the oracle's results.
 
     Attributes:
         function: Name of the function.
@@ -272,8 +272,8 @@ def verify_function(
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
         robot: The robot whose kinematics the function computes.
-        quantity: Name of a row of the table of quantities: "placement", "velocity", "jacobian",
-            "jacobian rate", "hessian", "acceleration", "relative placement", "analytical jacobian" or "imu".
+        quantity: Name of the quantity: "placement", "velocity", "jacobian", "jacobian rate", "hessian",
+            "acceleration", "relative placement", "analytical jacobian" or "imu".
         frame: Name of a link or joint; None: the robot's only tip.
         reference: Reference frame of the result.
         convention: Convention of the function's inputs and results, one that `Robot.convention` accepts.
@@ -281,9 +281,10 @@ def verify_function(
         samples: Number of random configurations.
         seed: Seed of the random configurations.
         factor: Number that multiplies the bound, for a function that rounds more than the textbook's
-            recursion. The result's `needed_factor` is the smallest sufficient factor.
+            recursion. `FunctionCheck.needed_factor` is the smallest factor with which the check passes.
         batch: True: the function receives q (n, nq), and v and a (n, nv), and returns n results.
-        **options: Other arguments of the method of `Robot`, such as `representation`.
+        **options: Further arguments of the `Robot` method that computes the quantity, such as
+            `representation`.
 
     Returns:
         The result; `print` shows it. In a test: `assert check.agrees, check`.
@@ -351,8 +352,8 @@ class _Compared:
         good: Indices of the configurations with a result of the right shape.
         found: The function's results (n, ...) at the configurations in `good`.
         expected: urdfkin's results at the configurations in `good`.
-        scale: The scale of the bound of these results.
-        k: (n,) the factor k of the bound k * eps * scale, for each result.
+        scale: The scale in the bound k * eps * scale of each number in `expected`.
+        k: (n,) the factor k in the bound k * eps * scale of each result.
     """
 
     first: int
@@ -365,12 +366,12 @@ class _Compared:
     theirs: FloatArray | None
 
     def shares(self, other: FloatArray) -> FloatArray:
-        """Compare with another result; return the ratio of each difference to its bound."""
+        """Return the differences between `found` and `other`, divided by their bounds."""
         k = self.k.reshape(-1, *[1] * (self.found.ndim - 1))
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Compare with other results, and return each difference in units of eps * scale.
+        """Return the differences between `found` and `other`, in units of eps * scale.
 
         A difference that is not finite becomes inf.
         """

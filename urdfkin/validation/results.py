@@ -117,7 +117,7 @@ class RobotReport:
         return max((tally.worst for tally in self.of(quantity)), default=None)
 
     def replay(self, key: Key) -> str | None:
-        """Return a command that computes a quantity's worst case again, or None if there is no worst case."""
+        """Return a command that computes the worst result of a quantity again; None if there is none."""
         quantity, reference = key
         case = self.tallies[key].case
         return None if case is None else replay(self.origin, quantity, reference, case)
@@ -267,7 +267,7 @@ class ValidationReport(Displayable):
     def as_dict(self) -> Document:
         """Return the JSON document.
 
-        An infinite disagreement, which may also result from NaN, becomes None.
+        If a disagreement is infinite or NaN, the document contains null.
         """
         judgements = iter(self.judgements)  # only compared robots have an accuracy result
         document = {

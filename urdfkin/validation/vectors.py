@@ -172,7 +172,7 @@ class Feature:
     Attributes:
         name: Name of the feature.
         rule: The standard's rule.
-        note: How libraries differ; None if no difference is known.
+        note: A known difference between libraries in this feature; None if no difference is known.
         text: The URDF.
         data: The bytes of the URDF file: the encoded text with its XML declaration.
         frames: Links of the test vectors.
@@ -276,7 +276,7 @@ def _tolerance(k: float, scale: float) -> str:
     """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
         return "0"
-    with localcontext(prec=_SAME):  # drop the last digits, in which processors may differ
+    with localcontext(prec=_SAME):  # drop the last digits, which may differ between processors
         number = +Decimal(k * max(EPS * scale, LEAST_UNIT))
     with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
         return str((+number).normalize())
