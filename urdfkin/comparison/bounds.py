@@ -3,8 +3,8 @@
 **Search.** The search looks for the configuration with the largest distance. The distance at the best
 configuration found is a lower bound of the largest distance. The true largest distance is between this lower
 bound and the upper bound (`urdfkin.model.mechanisms.upper_bound`). The search begins at the random
-configuration with the largest distance. It then varies one coordinate at a time. This works well because a
-position depends on the sine and the cosine of each joint value.
+configuration with the largest distance. The search then varies one coordinate at a time. This method works
+well because a position depends on the sine and the cosine of each joint value.
 
 **Branch and bound.** `urdfkin.model.mechanisms.upper_bound` adds the effects of all differences, each at its
 own worst configuration. If the models differ in many places, this sum is far above the largest distance.

@@ -119,7 +119,7 @@ class ToolEntry(TypedDict):
 
 
 class Rounding(TypedDict):
-    """Smaller distances and angles between matching frames count as rounding errors."""
+    """Largest distance (m) and angle (rad) between matching frames that `same` treats as rounding errors."""
 
     metres: Size
     radians: Size
@@ -446,7 +446,7 @@ def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
 def _as_written_errors(
     claim: FrameEntry, comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    """Yield wrong statements about the largest distance between the models as they are written."""
+    """Yield wrong statements about the largest distance between the unchanged models."""
     written = comparator.as_written(found)
     variables = variables_of(written, comparator.tolerance)
     names = [
@@ -477,7 +477,7 @@ def _interval_errors(
         search: The search for the largest distances between the two robots.
         frame: The pair of matching frames.
         claim: The certificate's statement about the frame.
-        rounding: Distance and angle (m, rad) that count as zero.
+        rounding: (m, rad) distance and angle below which two frames are treated as equal.
         sharply: Whether to prove an upper bound by branch and bound. This proof is slow, and it is skipped if
             another part of the certificate is wrong.
     """

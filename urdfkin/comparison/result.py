@@ -235,7 +235,7 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Two matched links that count as different end-effector frames.
+    """Two matched links that `same` reports as different tools (end-effector frames).
 
     `pose` (4, 4) is the pose of B's link `b` in the frame of A's link `a`.
     """
@@ -318,12 +318,12 @@ class Sameness(Displayable):
             if the two roots coincide.
         base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
             the poses of B relative to the second link. The two links belong to matching rigid bodies.
-        rounding: (m, rad) a smaller distance and a smaller angle between matching frames count as rounding
+        rounding: (m, rad) distances and angles between matching frames up to these values are rounding
             errors.
         single: (m, rad) bound on the distance and the angle between matching frames that single precision can
             cause. None if no file has single precision.
-        unexplained: The differences of the models as they are written, joint by joint, beyond rounding. The
-            numbers of a USD file are rounded to single precision.
+        unexplained: The differences of the unchanged models that rounding does not explain, joint by joint.
+            The numbers of a USD file are rounded to single precision.
         frames: The interval for each pair of matching links, after the changes in `after`.
         as_written: The interval for the frame with the largest distance between the models as they are
             written. None if `after` is empty.
@@ -374,7 +374,10 @@ class Sameness(Displayable):
 
     @property
     def _verdict(self) -> str:
-        """The verdict in words, with the changes of B if it depends on them."""
+        """The verdict in words.
+
+        If the models are only the same after changes of B, the text lists these changes.
+        """
         after = self.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
@@ -851,7 +854,7 @@ def remarks(
 
     Args:
         found: The alignment of the models.
-        variables: Their common variables.
+        variables: The common variables of the two models.
         tolerance: The tolerance within which numbers are equal.
         single: Relative error of a number that is rounded to single precision; 0 if both models have double
             precision.

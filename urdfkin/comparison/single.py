@@ -80,14 +80,14 @@ from urdfkin.model.tree import FloatArray, inverse
 
 
 class JointComparison:
-    """The comparison of two aligned models as they are written, joint by joint.
+    """The comparison of two aligned models joint by joint, without changes of the models.
 
     Args:
         found: The alignment of the two models. The class uses only the pairs of joints and links in this
             alignment.
         joints: Bounds (joints, 3) of A and of B, as in `SinglePrecision.joints`. The bounds are zero for a
             model in double precision.
-        base: (4, 4) pose of B's root in A's root frame, for models as they are written.
+        base: (4, 4) pose of B's root in A's root frame, for unchanged models.
         tolerance: The largest differences that count as rounding of double precision.
     """
 
@@ -159,7 +159,7 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "is carried by other joints in the other model")
             return
-        # paths[1][0] is B's path back to the reference link.
+        # The list paths[1][0] contains the joints of B between the common ancestor and the reference link P.
         if self.joints[0].any() and (len(steps) > 1 or self.joints[1][paths[1][0]].any()):
             yield JointDifference(name, "", None, "is carried by joints without a common link between them")
             return

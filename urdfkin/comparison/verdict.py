@@ -55,8 +55,8 @@ from urdfkin.verify.verifier import checked_choice
 
 #: Number of configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: The frame with the largest distance between A and B is searched among this number of frames.
-#: These frames have the largest distances at random configurations.
+#: The search for the frame with the largest distance considers only this number of frames: the frames with
+#: the largest distances at random configurations.
 FARTHEST = 4
 #: Longest allowed path length, metres. The squares of longer lengths would overflow.
 LONGEST = 1e150
@@ -281,7 +281,7 @@ class Comparator:
         return metres, radians
 
     def unexplained(self, found: Alignment) -> tuple[JointDifference, ...]:
-        """Return the differences of the models as they are written, joint by joint, beyond rounding.
+        """Return the differences of the unchanged models that rounding does not explain, joint by joint.
 
         The function compares A with B and also B with A, because the two comparisons have different bounds
         (`urdfkin.comparison.single`).

@@ -90,9 +90,9 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Return in words the largest distance and the largest angle between matching frames.
+    """Return a text with the largest distance and the largest angle between matching frames.
 
-    Return an empty text if distance and angle are within rounding.
+    The text is empty if distance and angle are only rounding errors.
     """
     lower, upper = (max((getattr(one, end) for one in frames), default=0.0) for end in ("lower", "upper"))
     seen, radians = (max((getattr(one, end) for one in frames), default=0.0) for end in TURNED)
@@ -110,9 +110,9 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Return in words the distance and the angle between a frame of A and the matching frame of B.
+    """Return a text with the distance and the angle between a frame of A and the matching frame of B.
 
-    Return an empty text if distance and angle are within rounding.
+    The text is empty if distance and angle are only rounding errors.
     """
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > DUST * rounding[0] else []
     parts += [up_to(angle, frame.radians_seen, frame.radians)] if frame.radians > DUST * rounding[1] else []
@@ -134,7 +134,8 @@ def far_frames(found: Sameness) -> list[Interval]:
 def farthest(found: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    A result up to single precision is about the models as they are written, but this table is not.
+    The verdict "same up to single precision" is about the unchanged models. The distances in the table are
+    distances after the changes of B, so the heading lists these changes.
     """
     changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
     return f"Largest distance over all configurations within limits{changed}"
@@ -148,7 +149,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 def as_written(found: Sameness) -> str:
     """Return a text with the distance between a frame of A and the frame of the unchanged model B.
 
-    The text is empty if the distance is within rounding.
+    The text is empty if the distance is only a rounding error.
     """
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)

@@ -56,7 +56,7 @@ _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
-#: urdfkin counts as less accurate if its typical or worst error exceeds Pinocchio's by more than this factor.
+#: urdfkin is called less accurate if its typical or worst error is more than FACTOR times Pinocchio's error.
 FACTOR = 2.0
 
 

@@ -207,7 +207,7 @@ class _Flight:
 
 
 class Cluster:
-    """Engine that keeps as many chunks in flight as the current workers can process."""
+    """Engine that keeps all current workers of a cluster busy with chunks."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -255,7 +255,7 @@ class Cluster:
             self._robots.clear()
 
     def _count(self) -> int:
-        """Return the number of chunks that may be in flight with the current workers."""
+        """Return the largest number of chunks that may be sent but not yet answered."""
         if time.monotonic() - self._counted > _COUNT and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
             self._room, self._counted = _FOR_EACH * threads + _MORE, time.monotonic()
@@ -273,7 +273,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Release the text of a robot that has no chunk in flight.
+        """Release the text of a robot if the workers have no chunk of this robot.
 
         If the robot is needed later, its text is sent again.
         """
