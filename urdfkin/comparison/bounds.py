@@ -310,7 +310,7 @@ def curvature(
 ) -> tuple[list[str], FloatArray]:
     """Return the variables' names, and bounds (m) on the second derivatives of D by each pair of variables.
 
-    All bounds are inf unless each variable moves the two joints of a matched pair by the same factor.
+    All bounds are inf if a variable moves two matched joints by different factors, or only one of them.
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     found = np.zeros((len(names), len(names)))

@@ -513,9 +513,9 @@ def _not_attained(
 ) -> Iterator[str]:
     """Yield the reasons why the lower bound of an interval is wrong.
 
-    There are two possible reasons. The configurations `q_a` and `q_b` of the interval may be invalid. Or
-    urdfkin or Pinocchio may compute a smaller distance or angle at `q_a` and `q_b` than the certificate
-    states.
+    There are two possible reasons. The configurations `q_a` and `q_b` of the interval may be invalid.
+    Otherwise, urdfkin or Pinocchio computes a smaller distance or angle at `q_a` and `q_b` than the
+    certificate states.
     """
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])

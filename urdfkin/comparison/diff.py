@@ -123,9 +123,9 @@ class Changes:
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: For each changed joint that moves links, the effect if only this joint is changed.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
-        rounding: (m, rad) bound on the pose error of any frame. The cause of this error is the single
-            precision of USD files. The bound is None if the files also differ in other ways, and infinite if
-            no bound was computed. The attribute `changes` does not contain this error.
+        rounding: (m, rad) bound on the pose error of any frame. This error is caused by the single precision
+            of USD files. The bound is None if the files also have other differences. The bound is infinite if
+            it was not computed. The attribute `changes` does not contain this error.
     """
 
     sources: tuple[str, str]

@@ -135,7 +135,10 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The parameter's values in A and in B, as numbers or words. None for a model without a value."""
+        """The parameter's values in A and in B, as numbers or words.
+
+        If a model has no value, its entry is None.
+        """
         if self.what == "limits":
             return _range(self.a), _range(self.b)
         if self.what == "idle":
@@ -214,7 +217,7 @@ class JointDifference:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A; None if only the difference between A and B has a meaning.
+        a: The parameter's value in A; None if `b` is the difference between A and B.
         b: The parameter's value in B, or a text. The text states the size of the difference, or why the
             models cannot be compared here.
         explained: A text with the largest difference that rounding can cause. The text is empty if no number
@@ -320,8 +323,8 @@ class Sameness(Displayable):
             the poses of B relative to the second link. The two links belong to matching rigid bodies.
         rounding: (m, rad) distances and angles between matching frames up to these values are rounding
             errors.
-        single: (m, rad) bound on the distance and the angle between matching frames that single precision can
-            cause. None if no file has single precision.
+        single: (m, rad) bound on the distance and the angle between matching frames, if single precision is
+            the only cause. None if no file has single precision.
         unexplained: The differences of the unchanged models that rounding does not explain, joint by joint.
             The numbers of a USD file are rounded to single precision.
         frames: The interval for each pair of matching links, after the changes in `after`.
@@ -405,7 +408,7 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The interval for the frame with the largest distance between A and the unchanged B.
+        """The interval for the frame with the largest distance between A and B, if B is not changed.
 
         A and B are compared at equal joint values.
 
@@ -488,8 +491,8 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert A's configurations (..., nq) to the corresponding configurations (..., nq) of B.
 
-        At corresponding configurations, A and B have the same poses, except for `base`. Coordinates that only
-        B has get their values in the neutral configuration.
+        At corresponding configurations, A and B have the same poses, except for `base`. A coordinate that
+        only B has is set to its value in the neutral configuration.
 
         Raises:
             InputError: q does not have A's length.
@@ -692,7 +695,7 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
 def _around(found: Alignment) -> set[tuple[int, int]]:
     """Return the matching frames of the root body that only describe how the robot is mounted.
 
-    Some of these frames are links between the root and the link that carries the first moving joint. The
+    Some of these frames are links before the first moving joint, counted from the root. The
     other frames are links such as a world or a table: they carry no moving joint, and they have the same pose
     in the root frames of A and B.
     """
@@ -858,8 +861,8 @@ def remarks(
         tolerance: The tolerance within which numbers are equal.
         single: Relative error of a number that is rounded to single precision; 0 if both models have double
             precision.
-        as_written: Whether to compare limits as written. Otherwise, B's limits are first converted to A's
-            joint direction and joint zero.
+        as_written: Whether to compare limits as written. Otherwise, B's limits are first converted to the
+            coordinate of A's joint.
     """
     some = list[Difference]()
     for step in found.steps:
@@ -905,8 +908,8 @@ def limit_differences(
         tolerance: Tolerance of a limit, relative to the larger of its absolute value and 1 (rad or m).
         single: Relative error of a limit that is rounded to single precision; 0 if the limits have double
             precision.
-        zero: Sign and offset in: value in B = sign * value in A + offset. The function uses this formula to
-            convert B's limits to A's coordinate.
+        zero: Pair (sign, offset) with (value in B) = sign * (value in A) + offset. The function uses this
+            formula to convert B's limits to A's coordinate.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

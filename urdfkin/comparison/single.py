@@ -1,9 +1,9 @@
 """Prove joint by joint that single precision is the cause of every difference between two models.
 
 A bound on the displacement of a frame by rounding is a sum over all joints. This sum is larger for robots
-whose prismatic joints have long ranges. An error in one joint can be smaller than the sum, and then the sum
-does not reveal the error. The proof in this module has no such sum: each joint may differ only by the
-rounding of this joint's own numbers.
+whose prismatic joints have long ranges. An error in one joint can be smaller than this sum, so a comparison
+with the sum does not detect the error. The proof in this module has no such sum: each joint may differ only
+by the rounding of this joint's own numbers.
 
 **What is compared.** Two files can describe the same joint by different frames. For example, the origin of a
 joint may be shifted along its axis, and a converter may add links or merge fixed links. Therefore, the proof
@@ -42,8 +42,8 @@ In B, P may be no ancestor of the link: the paths to P and to the link may branc
 and E be the position error and the rotation error of the link relative to this common ancestor. Let V and F
 be the position error and the rotation error of P relative to the common ancestor. Let d be the distance
 between the link and P. Then the position error of the link relative to P is at most W + V + F d, and the
-rotation error is at most E + F. The rounding errors of double precision, which `same` ignores, are added to
-these bounds. If both models are rounded, the bounds of both models are added.
+rotation error is at most E + F. `same` ignores the rounding errors of double precision, so these errors are
+added to the bounds. If both models are rounded, the bounds of both models are added.
 
 **Both orders.** The bound for one joint can contain the rounding of other joints. This happens if the parent
 of the joint is a link that only B has, or if P is far from the joint in B. Therefore, `same` compares A with

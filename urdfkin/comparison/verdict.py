@@ -148,7 +148,8 @@ class Comparator:
         given: For each joint name of A, the name of the matching joint in B.
         bounds: Whether to bound the largest distances.
         boxes: Largest number of boxes of configurations that exist at the same time.
-        within: Distance (metres and radians) that the bounds should prove; None if no distance is given.
+        within: Distance (metres and radians) for which the bounds should give a proof; None if no distance is
+            given.
     """
 
     def __init__(
@@ -210,7 +211,7 @@ class Comparator:
     def said(self, found: Alignment, variables: Variables) -> Sameness:
         """Return the result that follows from the alignment, without intervals and without confirmation.
 
-        The method also corrects the tools in `found`. A tool is a frame without children that differs
+        The method also sets the tool frames in `found`. A tool is a frame without children that differs
         between A and B.
         """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
@@ -381,7 +382,7 @@ class Comparator:
     def _most(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) for all frames.
+        """Return one bound (m, rad) that is valid for all frames.
 
         The function improves the bound only if the improved bound can prove the distance `within`.
         """

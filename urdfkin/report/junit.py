@@ -114,7 +114,7 @@ def _suite_element(
 
 
 def _incomplete(document: Document) -> bool:
-    """Whether the run has an error that belongs to no robot."""
+    """Whether the run has an error that concerns no single robot."""
     robots = document["robots"]
     return document["interrupted"] or not robots or len(robots) != document.get("asked", len(robots))
 

@@ -147,7 +147,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return a text with the distance between a frame of A and the frame of the unchanged model B.
+    """Return a text with the distance between a frame of A and the matching frame of B, if B is not changed.
 
     The text is empty if the distance is only a rounding error.
     """

@@ -47,7 +47,10 @@ def second_reader_words(robot: Robot) -> str:
 
 
 def units(value: Units, *, compared: bool = True) -> str:
-    """Format a disagreement. None means infinity (`inf`); the text is empty if nothing was compared."""
+    """Format a disagreement.
+
+    The input None is shown as `inf` (infinity). If nothing was compared, the text is empty.
+    """
     if not compared:
         return ""
     if value is None:
@@ -118,7 +121,7 @@ def worst_of(robot: Robot, names: Sequence[str]) -> str:
 
 
 def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
-    """Return the library with the smaller typical error, or `equal` if the two errors are the same double."""
+    """Return the library with the smaller typical error, or "equal" if both errors are the same number."""
     ours, theirs = line["urdfkin"]["typical"], line["pinocchio"]["typical"]
     return "equal" if ours == theirs else "urdfkin" if ours < theirs else "Pinocchio"
 
@@ -175,7 +178,7 @@ def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[st
 
 
 def second_oracle_cells(checks: Sequence[Check], title: str) -> list[str]:
-    """Return the cells under `second_oracle_heads` for several checks.
+    """Return the cells of a table row with the headings `second_oracle_heads`, for several checks.
 
     The cell of a pair of libraries contains the largest ratio of a disagreement to its bound.
     """

@@ -100,7 +100,10 @@ _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """Error for a damaged file: its bytes are not the results of the chunk. The message states the reason."""
+    """Error for a damaged file, which does not contain the results of the chunk.
+
+    The message states the reason.
+    """
 
 
 def written(key: str, found: Answer) -> bytes:

@@ -91,7 +91,7 @@ def validate(
         retry: "failed": repeat the check of robots that could not be checked before. Their files may have
             changed since then.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
-            covers only that part.
+            covers only this part of the work.
         progress: Callback, called before the work and after each chunk.
 
     Returns:

@@ -426,8 +426,8 @@ class Robot(TypedDict):
 class Document(Header):
     """The output of `urdfkin validate --json`.
 
-    New entries may be added in the same version of the layout. An entry is removed or changes its meaning
-    only in a new version.
+    A version of the layout may receive new entries. An entry is removed or changes its meaning only in a new
+    version of the layout.
     """
 
     started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]

@@ -30,7 +30,7 @@ SIDES = ("urdfkin", "pinocchio", "second_oracle")
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Comparison of one library's results with the second oracle's.
+    """Comparison of one library's results with the results of the second oracle.
 
     Attributes:
         failed: Number of results outside their bound.

@@ -1,4 +1,4 @@
-"""Check a function of a user against urdfkin, the oracle and the derived bound.
+"""Compare a user's function with urdfkin and the oracle, within the derived bound.
 
 The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
 function at random configurations, at the zero configuration and at the joint limits. First, the module

@@ -87,7 +87,7 @@ def _free() -> Iterator[int]:
 
 
 def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
-    """Yield the free bytes of a control group and of its parents, whose limits apply too.
+    """Yield the free bytes of a control group and of its parent groups, because all their limits apply.
 
     In a container, the last parent is the container's own group, because its parents are not visible.
     """

@@ -240,8 +240,8 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The command that repeats the run.
 
-        Robots with the same options are on the same line. The command reads a robot that was passed as text
-        from standard input, so each of these robots has a line of its own.
+        Robots with the same options are on the same line. If a robot was passed as text, the command reads
+        the text from standard input. Each of these robots has its own line.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(

@@ -40,8 +40,7 @@ class RobotInput:
         source: A path, a catalogue name or the text of the URDF, as for `load`.
         origin: Source of the robot (also if `source` is the text) and its loading options.
         stamp: The sha256 of the robot's text; empty if the text cannot be read.
-        file: If `source` is the text of the robot: the file name that the findings (errors and warnings)
-            show.
+        file: The file name in errors and warnings, if `source` is the text of the robot.
         listed: Findings (errors and warnings) about the original MJCF or USD file, if the text was converted.
         made: Whether the text was converted from another format than URDF.
     """

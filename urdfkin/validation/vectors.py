@@ -2,8 +2,8 @@
 
 The file `robots/features.toml` defines small robots with one feature of URDF each. For robots of the
 catalogue, the vectors contain the robot's name, not its URDF. The reader of `urdfkin.verify.exact` computes
-all values from the decimals of the URDF. The files depend on nothing but these texts: configurations are made
-from digests, not by a random generator.
+all values from the decimals of the URDF. The files depend only on these texts. Configurations are computed
+from digests of names instead of random numbers.
 """
 
 from __future__ import annotations
