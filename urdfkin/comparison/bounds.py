@@ -3,8 +3,8 @@
 **Search.** The search looks for the configuration with the largest distance. The distance at the best
 configuration found is a lower bound of the largest distance. The true largest distance is between this lower
 bound and the upper bound (`urdfkin.model.mechanisms.upper_bound`). The search begins at the random
-configuration with the largest distance. It then varies one coordinate at a time. This works well because a
-position depends on the sine and the cosine of each joint value.
+configuration with the largest distance. The search then varies one coordinate at a time. This method works
+well because a position depends on the sine and the cosine of each joint value.
 
 **Branch and bound.** `urdfkin.model.mechanisms.upper_bound` adds the effects of all differences, each at its
 own worst configuration. If the models differ in many places, this sum is far above the largest distance.
@@ -14,7 +14,7 @@ p_A in each box. In a box with middle c and half widths h,
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
 
 Here D_i is the derivative of D by variable i, and M_ij bounds the second derivatives at every configuration.
-A box with a bound below the target needs no further work. Every other box is halved.
+If the bound of a box is below the target, the box is finished. Every other box is halved.
 
 M_ij is computed joint by joint. The derivative of a rotated vector by the angle is the cross product of the
 axis u with the rotated vector. Let y be the position of B's frame, and d the vector from A's frame to B's
@@ -23,8 +23,8 @@ frame. The derivatives of y and d by a joint value are
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
 with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A, and S', u', o'
-and t' are the screw, axis, point and value of the matched joint in B. The joints between the base and this
-joint only rotate these derivatives, because a derivative is a free vector
+and t' are the screw, axis, point and value of the matched joint in B. A derivative is a free vector: a joint
+between the base and this joint rotates the derivative and does not translate it
 (`urdfkin.model.mechanisms.upper_bound`).
 """
 
@@ -68,12 +68,13 @@ from urdfkin.verify.oracle import QueryBatch
 #: The first number is the number of random configurations at the start of a search. The second number is the
 #: number of further configurations, in which each variable is at an end of its range.
 SAMPLES, CORNERS = 512, 128
-#: The search starts from the `STARTS` worst random configurations.
-#: Along each coordinate, it tries `ALONG` values.
+#: The search starts from the `STARTS` worst random configurations. For each coordinate, the search tries
+#: `ALONG` different values.
 STARTS, ALONG = 4, 13
 #: Frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
-#: For each round of the search: the fraction of a coordinate's range over which the coordinate is varied.
+#: The search has one round for each of these numbers. In a round with the number 0.1, each coordinate is
+#: varied within a tenth of its range.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
@@ -97,9 +98,9 @@ class Search:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) pose in A's root frame at which B's base link is placed; this pose moves with A's base link.
+        #: (4, 4) pose of B's base link in A's root frame. If A's base link moves, this pose moves with it.
         self.hold = found.X @ found.b.homes[found.base[1]]
-        #: For each robot, whether its base link is on the root body.
+        #: For each robot: whether the base link belongs to the same rigid body as the root link.
         self.stands = tuple(
             m.body_of[link] == 0 for m, link in zip((found.a, found.b), found.base, strict=True)
         )
@@ -140,7 +141,7 @@ class Search:
         return q_a, q_b
 
     def belong_together(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Return whether configurations (1, nq) correspond and are within all ranges, up to rounding."""
+        """Return whether `q_b` (1, nq) corresponds to `q_a`, and both are within the joint ranges."""
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
             return False
@@ -161,9 +162,9 @@ class Search:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """As `poses`, for given configurations (n, nq) of A and of B.
+        """Return the same as `poses`, but for given configurations (n, nq) of A and of B.
 
-        `computed` is the function that computes placements.
+        `computed` is the function that computes the poses of the frames.
         """
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
@@ -190,7 +191,7 @@ class Search:
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
     def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (n, frames) between matching frame origins (m); arguments as for `poses`."""
+        """Return the distances (n, frames) between the origins of matching frames (m)."""
         return self.at(*self.configurations(z), frames, own_results)
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
@@ -224,7 +225,8 @@ class Search:
         """Maximize each frame's distance by coordinate search.
 
         Args:
-            frames: The frames; each frame has its own search, and all searches run in one batch.
+            frames: The frames. Each frame is searched separately, but all searches are evaluated in one
+                batch.
             z: (frames, starts, variables) start values.
         """
         ways = [self._variables_of(frame) for frame in frames]
@@ -258,7 +260,8 @@ class Search:
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """Return distances (frames, starts, values).
 
-        Each frame has its own values of the variables in `z`.
+        The array `z` (frames, starts, values, variables) contains separate values of the variables for each
+        frame.
         """
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # also for robots without variables
         off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
@@ -305,10 +308,9 @@ _Vectors = tuple[Support, Support]
 def curvature(
     steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Return the variables' names, and bounds (variables, variables) of the second derivatives of D, metres.
+    """Return the variables' names, and bounds (m) on the second derivatives of D by each pair of variables.
 
-    A bound is inf if two variables move a pair of matched joints, or if one variable moves the two joints by
-    different factors.
+    All bounds are inf if a variable moves two matched joints by different factors, or only one of them.
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     found = np.zeros((len(names), len(names)))
@@ -349,7 +351,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
 ) -> float:
-    """Transform d and y from the last step back to the base. Return the largest length of d there."""
+    """Return the largest length that d has at the base; `vectors` contains d and y at the last joint."""
     vectors = before_it(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -358,9 +360,10 @@ def _pass_to_front(
 
 
 def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
-    """Return the derivatives of d and y with respect to a joint's value.
+    """Return the derivatives of the vectors d and y with respect to a joint's value.
 
-    They are valid after the rigid motion L.
+    The module's text defines d and y. The derivatives are expressed in the frame behind the joint's constant
+    rigid motion L.
     """
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
@@ -370,9 +373,9 @@ def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Su
 
 
 def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
-    """Return bounds for the cross products of u with d and of u' with y.
+    """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B.
 
-    The bound for d allows for a difference between the axes u and u'.
+    If u and u' differ, their difference is added to the bound on u x d.
     """
     G, axis, other = d.grid.points, step.axis, step.other
     most = 0.0
@@ -386,7 +389,7 @@ def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: Step) -> Step:
-    """Return the step without its translations, because a free vector is only rotated."""
+    """Return a pair of matched joints without its translations, which do not affect free vectors."""
     axis = Screw(step.axis.direction, _ORIGIN)
     other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
@@ -403,7 +406,7 @@ TOGETHER = 2**16
 class Boxes:
     """Upper bounds on the distance between a frame's origin in A and in B.
 
-    Each bound holds for a box of configurations.
+    A box is a range for each variable. Each bound is valid for all configurations in one box.
 
     Args:
         search: The search, which contains both robots.
@@ -463,7 +466,8 @@ class Boxes:
 def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
     """Return a proven upper bound (m) on a frame's distance.
 
-    The bound is `target` if the search proves it, otherwise at most `upper`.
+    If the search proves the bound `target`, the function returns `target`. Otherwise it returns a bound of at
+    most `upper`.
 
     Args:
         search: The search, which contains both robots.
@@ -508,18 +512,18 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
 def moved_together(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[Step], list[Pair | None]]:
-    """Return the steps on a frame's path that have an effect on the length of D.
+    """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
 
-    A joint before the first difference of the models rotates D and does not change its length. However, a
-    mimic joint after the difference may follow this joint. Then D depends on the joint, and the step is
-    included. The result begins with the first step that differs, or that shares a variable with a differing
-    step.
+    Most joints before the first difference of the models rotate D without a change of its length. A mimic
+    joint after the difference may depend on a joint before the difference. This earlier joint then changes
+    the length of D. So the result begins with the first joint that differs, or whose variable also moves a
+    joint after the first difference.
     """
     steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
     first = len(steps) - len(behind_first(found, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
-            first = i  # the steps between the first and the last such step are included too
+            first = i  # all joints from joint i to the first difference are included
     return steps[first:], pairs[first:]
 
 
@@ -534,7 +538,7 @@ def _longest(h: FloatArray, M: FloatArray) -> int:
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return the number of times a box must be halved until its bound can be below `upper`."""
+    """Return how many times a box must be halved before the box can have a bound below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_longest(h, M)] /= 2.0

@@ -35,10 +35,10 @@ MOST_AGAIN = 2**22
 #: Tolerances for numbers in a certificate that was made on another machine: the relative tolerance, and the
 #: absolute tolerance (m or rad) for numbers near zero.
 _RELATIVE, _ZERO = 1e-9, 1e-15
-#: A bound that is proven again may be larger by this number times the machine epsilon, because sums round
-#: differently on other machines.
+#: Another machine may round sums differently. So a bound that is proven again may be larger than the bound in
+#: the certificate, by a factor of 1 + _LAST_BITS * (machine epsilon).
 _LAST_BITS = 64.0
-#: Entries of the certificate that follow from the alignment of the two models.
+#: Entries that `recheck` computes again from the two models, and compares with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
@@ -111,7 +111,7 @@ class JointEntry(TypedDict):
 
 
 class ToolEntry(TypedDict):
-    """A pair of matched links that count as different end-effector frames, because their mounting differs."""
+    """Two matched links with different poses on their rigid body; `same` reports them as different tools."""
 
     a: Annotated[str, says("Link of A.")]
     b: Annotated[str, says("Link of B.")]
@@ -119,7 +119,7 @@ class ToolEntry(TypedDict):
 
 
 class Rounding(TypedDict):
-    """Smaller distances and angles between matching frames count as rounding errors."""
+    """Largest distance (m) and angle (rad) between matching frames that `same` treats as rounding errors."""
 
     metres: Size
     radians: Size
@@ -164,7 +164,7 @@ class Confirmed(TypedDict):
 
 
 class Certificate(Header):
-    """A statement whether two models are the same robot, with the data that prove it, in m and rad."""
+    """A statement whether two models are the same robot, with the data for a proof. Units are m and rad."""
 
     a: Model
     b: Model
@@ -235,7 +235,7 @@ def certificate(found: Sameness, command: str | None = None) -> Certificate:
     return cast("Certificate", plain(document))
 
 
-#: Entries of the certificate that are copies of the attributes of `Sameness` with the same names.
+#: Attributes of `Sameness` that are copied to the certificate under the same names.
 _TAKEN_OVER = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written", "checked",
@@ -255,14 +255,15 @@ def words_of(entry: DifferenceEntry) -> str:
 def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models, and return its wrong statements.
 
-    The list is empty if all are right.
+    The list is empty if the certificate is right.
 
-    The recheck aligns the models as the certificate states, so it needs no search. First it checks that this
-    alignment is allowed. The transforms must be rigid motions, and the joints must exist. If joints are in
-    another order, this order must give the same motion. Then the recheck derives the verdict, the changes and
-    the remarks from the alignment, and compares them with the certificate. A lower bound is a distance at a
-    configuration in the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound
-    is proven again.
+    The certificate states which joints match, and how the coordinates of A are converted to those of B. The
+    recheck uses these statements, so it needs no search. First, the function checks the statements. The
+    transforms must be rigid motions, and the named joints must exist. If the certificate changes the order of
+    joints, the new order must give the same motion. Then the function computes the verdict, the changes and
+    the remarks again, and compares them with the certificate. A lower bound is a distance at a configuration
+    in the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound is proven
+    again.
 
     Args:
         document: The result of `certificate`, or of `SAME.read`.
@@ -315,7 +316,7 @@ def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
 
 
 def _statement_errors(document: Certificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
-    """Yield wrong statements in the names, the verdict and other entries that need no proof."""
+    """Yield errors in entries without a proof: names, verdict, differences, tools, and `DERIVED` entries."""
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
         if model["name"] != robot.name:
@@ -355,10 +356,7 @@ def _place(one: DifferenceEntry) -> tuple[str, str]:
 
 
 def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: tuple[float, float]) -> bool:
-    """Return whether two differences agree.
-
-    Their values must be equal, and their sizes must be equal up to rounding.
-    """
+    """Return whether two entries describe the same difference; metres and radians may differ by rounding."""
     return (
         all(_equal(claimed[part], said[part]) for part in ("a", "b", "detail"))
         and math.isclose(claimed["metres"], said["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
@@ -389,9 +387,9 @@ def _confirmation_errors(
 
 
 def _gauge(document: Certificate) -> Gauge:
-    """Return the free choices that a certificate states.
+    """Return the transforms, offsets and joint orders with which a certificate aligns B with A.
 
-    They align B with A. They are the pose of the base, the sense and the zero offset of each joint, the
+    The certificate states the pose of the base, the direction and the zero offset of each joint, the
     conversions of planar and floating joints, and the order of joints.
     """
     joints, base = document["joints"], document["base_links"]
@@ -409,7 +407,7 @@ def _gauge(document: Certificate) -> Gauge:
 
 
 def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) -> str | None:
-    """Return the reason why the free choices of a certificate are not allowed; None if they are allowed."""
+    """Return the reason why the certificate's alignment of B with A is not allowed; None if it is allowed."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -448,7 +446,7 @@ def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
 def _as_written_errors(
     claim: FrameEntry, comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    """Yield wrong statements about the largest distance between the models as they are written."""
+    """Yield wrong statements about the largest distance between the unchanged models."""
     written = comparator.as_written(found)
     variables = variables_of(written, comparator.tolerance)
     names = [
@@ -479,7 +477,7 @@ def _interval_errors(
         search: The search for the largest distances between the two robots.
         frame: The pair of matching frames.
         claim: The certificate's statement about the frame.
-        rounding: Distance and angle (m, rad) that count as zero.
+        rounding: (m, rad) distance and angle below which two frames are treated as equal.
         sharply: Whether to prove an upper bound by branch and bound. This proof is slow, and it is skipped if
             another part of the certificate is wrong.
     """
@@ -515,8 +513,9 @@ def _not_attained(
 ) -> Iterator[str]:
     """Yield the reasons why the lower bound of an interval is wrong.
 
-    The interval's configurations may be invalid. At these configurations, urdfkin or Pinocchio may also
-    compute another distance.
+    There are two possible reasons. The configurations `q_a` and `q_b` of the interval may be invalid.
+    Otherwise, urdfkin or Pinocchio computes a smaller distance or angle at `q_a` and `q_b` than the
+    certificate states.
     """
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])

@@ -35,7 +35,7 @@ from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source, Text, is_usd
 from urdfkin.urdf.writer import to_urdf
 
-#: Attributes in a URDF that consist of several numbers, each with the names of its numbers.
+#: URDF attributes that consist of several numbers. The value lists the names of these numbers.
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
 #: Default values of a joint's attributes, for attributes that the file omits.
 _DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
@@ -123,9 +123,9 @@ class Changes:
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: For each changed joint that moves links, the effect if only this joint is changed.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
-        rounding: (m, rad) bound on the error of any frame that single precision in a USD file causes. None if
-            the files also differ in other ways. This rounding is not among the changes. It is infinite if no
-            bound was computed.
+        rounding: (m, rad) bound on the pose error of any frame. This error is caused by the single precision
+            of USD files. The bound is None if the files also have other differences. The bound is infinite if
+            it was not computed. The attribute `changes` does not contain this error.
     """
 
     sources: tuple[str, str]
@@ -147,8 +147,8 @@ class Changes:
 def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: bool = True) -> Changes:
     """List the changes from one version of a description to another, attribute by attribute.
 
-    If the versions have different formats (URDF, MJCF, USD), the changes are the differences that `same`
-    finds, with the names of the old version.
+    The two versions may have different formats (URDF, MJCF, USD). Then the changes are the differences that
+    `same` finds. The listed joints and links have the names of the old version.
 
     Args:
         a: The old version: a robot, or a source for `load`.
@@ -176,7 +176,7 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
 
 
 def _format(robot: Robot) -> str:
-    """Return the format of a robot's source; a table counts as a URDF."""
+    """Return the format of a robot's source; for a Denavit-Hartenberg table, return the format of a URDF."""
     if is_usd(robot.source):
         return "USD"
     return "MJCF" if robot.origin.sha256 else "URDF"
@@ -202,7 +202,7 @@ def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
 
 
 def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[Change]:
-    """Yield the differences of the joints, then all other differences, then names and remarks."""
+    """Yield the differences of the joints first, then all other differences, then names and remarks."""
     for at in found.unexplained:
         if at.what and at.a is None:
             yield Change(at.place, at.what, None, None, str(at.b))
@@ -267,7 +267,7 @@ def _renamed(found: Sameness) -> KinematicTree:
     tree = found.trees[1]
     links = {theirs: ours for ours, theirs in found.links}
     joints = {one.b: one.a for one in found.joints}
-    for i, joint in enumerate(tree.joints):  # a fixed joint has the name of A's joint to the same link
+    for i, joint in enumerate(tree.joints):  # name a fixed joint like A's joint that carries the same link
         link = links.get(tree.links[i + 1])
         if joint.name not in joints and link in found.trees[0].links[1:]:
             joints[joint.name] = found.trees[0].joints[found.trees[0].link_index(link) - 1].name
@@ -335,8 +335,8 @@ def _value(text: str) -> Value:
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
     """Compute the distances by which the changes of a single joint move the frames.
 
-    The function copies the old robot, replaces this joint by that of the new robot, and compares the copy
-    with the old robot.
+    The function makes a copy of the old robot, in which only this joint has the values of the new robot. Then
+    `same` compares the copy with the old robot.
 
     Args:
         old: The tree of the old robot.
@@ -364,7 +364,7 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
 
 
 def _quietly(tree: KinematicTree) -> Robot:
-    """Make a robot from a tree. Suppress warnings about its URDF, which urdfkin itself writes."""
+    """Make a robot from a tree, without warnings about the URDF that urdfkin writes for this tree."""
     text = Text(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)
 

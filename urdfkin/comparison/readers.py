@@ -27,15 +27,15 @@ from urdfkin.verify.adapters import LIBRARIES, version
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Largest difference between two poses that count as equal, if positions are at most 1 m; for larger
-#: positions, a multiple of this number. Libraries that compute in double precision differ by less than 1e-13.
-#: A misread element causes a larger difference.
+#: Two poses count as equal if they differ by at most this number. If positions are larger than 1 m, the
+#: number is multiplied by the largest position in metres. Libraries that compute in double precision differ
+#: by less than 1e-13. A misread element causes a larger difference.
 _EQUAL = 1e-9
-#: The same for libraries that compute in single precision.
+#: For libraries that compute in single precision: largest difference between two poses that count as equal.
 _EQUAL_SINGLE = 1e-5
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
-#: Largest answer of a library, in bytes.
+#: Maximum number of bytes that a library's process may return.
 _MOST = 400_000_000
 #: Longest quotation of a library's message, in characters.
 _QUOTED = 200
@@ -49,7 +49,8 @@ class Difference:
         joint: Name of the joint.
         element: Element of the file that explains the difference.
         words: The difference in words.
-        size: Largest difference of the child's pose in the parent link (m, and entries of a rotation).
+        size: Largest difference of an entry of the child link's pose in the parent link (m, or rotation
+            entry).
     """
 
     joint: str
@@ -60,7 +61,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class LibraryReading:
-    """How a library reads a robot file.
+    """The differences between a library and urdfkin in reading a robot file.
 
     Attributes:
         library: Name of the library.
@@ -104,7 +105,7 @@ def compare_readers(
     """Compare how libraries read a robot's file with how urdfkin reads it.
 
     Args:
-        robot: The robot. All its links are compared at q = 0 and at random configurations.
+        robot: The robot. The poses of all links are compared at q = 0 and at random configurations.
         libraries: Names of libraries (`installed`); by default all installed libraries that read the format.
         samples: Number of random configurations.
         seed: Seed of the configurations.
@@ -221,7 +222,7 @@ def _source(robot: Robot) -> tuple[str, str]:
 
 
 def _without_shapes(text: str) -> str:
-    """Return a URDF text without meshes and other shapes, which some libraries look for on disk."""
+    """Return a URDF text without shapes, because some libraries search the disk for the files of meshes."""
     from xml.etree.ElementTree import tostring  # noqa: PLC0415
 
     robot = plain_xml(text)
@@ -265,8 +266,8 @@ def _explained(
 ) -> tuple[str, str]:
     """Return the element that explains a difference, and the difference in words.
 
-    T (urdfkin) and `found` (library) are the poses of the child link in the parent link; the first pose is at
-    q = 0.
+    `T` contains urdfkin's poses of the child link in the parent link, and `found` the library's. The first
+    pose is the pose at q = 0.
     """
     off = np.abs(T - found)
     name, words = f"type {joint.kind.value}", "has no coordinate for it"

@@ -37,17 +37,17 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
-#: `_TENTH` is the smallest number that is printed with a unit prefix: it is 0.1 after rounding to four
-#: digits. The unit without a prefix is used only for numbers of at least `_NINE` times `_TENTH`, which is
-#: 0.9.
+#: `_TENTH` is the smallest number that is printed with a unit prefix, for example 0.1 mm. `_TENTH` is 0.1
+#: after rounding to four digits. Numbers of at least `_NINE` times `_TENTH` (0.9) have no prefix, for example
+#: 0.9 m.
 _TENTH, _NINE = 0.09995, 9.0
 
 
 class Verdict(Enum):
     """The verdict: two models are the same, the same after the changes in `Sameness.up_to`, or different.
 
-    They are the same up to single precision if each joint differs only by the rounding of its own numbers to
-    single precision.
+    Two models are the same up to single precision if each joint differs by no more than the rounding of this
+    joint's own numbers to single precision.
     """
 
     SAME = "same"
@@ -56,8 +56,8 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes that do not make two models different. Two models are equivalent if they agree after such
-#: changes. The headline of a result names the kinds in this order.
+#: Kinds of changes that do not make two models different. Two models are equivalent if they agree after
+#: changes of these kinds. The headline of a result names the kinds in this order.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences for which the distance between each pair of matching frames can still be bounded.
 BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
@@ -70,7 +70,8 @@ class Question:
     Attributes:
         within: Largest allowed distance between matching frames of the models as they are written, in metres
             and in radians. If it is None, the question is whether the models are equivalent.
-        strict: Whether models that are only equivalent, or that have remarks, count as different.
+        strict: Whether the answer is also no for models that are equivalent but not the same, and for models
+            with remarks, such as different joint limits.
     """
 
     within: float | None = None
@@ -120,8 +121,8 @@ class Difference:
         b: The parameter's value in B. None if the parameter has no value.
         radians: Angular part of the difference, radians; 0 if the difference has no angular part.
         metres: Linear part of the difference, metres; 0 if the difference has no linear part.
-        detail: "alone" if a joint's axis differs although the links moved by this joint agree. "converted" if
-            the limits of B were converted to the coordinate of A. Otherwise empty.
+        detail: "alone" if the joint's axis differs, but the links behind the joint agree. "converted" if the
+            limits of B were converted to the coordinate of A. Otherwise empty.
     """
 
     place: str
@@ -134,7 +135,10 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The parameter's value in A and in B, each as a number or in words; None if there is none."""
+        """The parameter's values in A and in B, as numbers or words.
+
+        If a model has no value, its entry is None.
+        """
         if self.what == "limits":
             return _range(self.a), _range(self.b)
         if self.what == "idle":
@@ -213,10 +217,11 @@ class JointDifference:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A; None if only the difference between A and B has a meaning.
-        b: The parameter's value in B, the size of the difference, or the reason why there is no comparison.
-        explained: A text with the largest difference that rounding can cause. It is empty if no number is
-            rounded.
+        a: The parameter's value in A; None if `b` is the difference between A and B.
+        b: The parameter's value in B, or a text. The text states the size of the difference, or why the
+            models cannot be compared here.
+        explained: A text with the largest difference that rounding can cause. The text is empty if no number
+            is rounded.
     """
 
     place: str
@@ -233,7 +238,7 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Two matched links that count as different end-effector frames.
+    """Two matched links that `same` reports as different tools (end-effector frames).
 
     `pose` (4, 4) is the pose of B's link `b` in the frame of A's link `a`.
     """
@@ -243,8 +248,8 @@ class Tool:
     pose: FloatArray
 
 
-#: Whether Pinocchio confirmed the bounds, was not asked because the user requested no checks, or could not
-#: confirm them.
+#: Result of Pinocchio's check of the bounds. "not asked" means that the user requested no check. "not
+#: verified" means that Pinocchio could not confirm the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
 _WORDS = {"not asked": "not asked of Pinocchio", "not verified": "not verified by Pinocchio"}
 
@@ -278,8 +283,8 @@ class Confirmation:
 class JointMap:
     """A joint of A and the matching joint of B: value_b = sense * value_a + offset (rad, m).
 
-    For a planar or floating joint, `sense` is 1 and `offset` is 0. If the pose of such a joint differs
-    between A and B, `conversion` converts A's pose to B's.
+    For a planar or floating joint, `sense` is 1 and `offset` is 0. If A and B describe this joint by
+    different poses, `conversion` converts the pose in A to the pose in B.
     """
 
     a: str
@@ -302,33 +307,34 @@ class Sameness(Displayable):
         verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, `UP_TO_SINGLE`, or `DIFFERS`.
         after: The changes that bring B closest to A, with one line of text for each change. The changes are
             listed even if the models still differ after these changes.
-        up_to: The kinds of the changes in `after`: "base", "zeros", "senses", "free joints", "tools".
+        up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
         differences: The differences, ordered from the base to the tips.
         remarks: Differences that do not affect motion: joint limits, joint types, and links that only one
             model has.
         joints: The matched joints of A and B.
         links: The matched links of A and B.
-        tools: Pairs of links on the same body with different poses. They are reported as different tools.
-        orders: Groups of consecutive joints that B has in another order than A. The robot moves in the same
-            way with both orders.
+        tools: Pairs of matched links with different poses on the same rigid body. `same` reports the two
+            links as different tools.
+        orders: Groups of consecutive joints whose order differs between A and B. The motion of the robot does
+            not depend on the order of these joints.
         base: (4, 4) pose of B's root in A's root frame, in the zero configuration. The pose is the identity
             if the two roots coincide.
         base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
             the poses of B relative to the second link. The two links belong to matching rigid bodies.
-        rounding: (m, rad) a smaller distance and a smaller angle between matching frames count as rounding
+        rounding: (m, rad) distances and angles between matching frames up to these values are rounding
             errors.
-        single: (m, rad) bound on the distance and the angle between matching frames that single precision can
-            cause. None if no file has single precision.
-        unexplained: The differences of the models as they are written, joint by joint, beyond rounding. The
-            numbers of a USD file are rounded to single precision.
+        single: (m, rad) bound on the distance and the angle between matching frames, if single precision is
+            the only cause. None if no file has single precision.
+        unexplained: The differences of the unchanged models that rounding does not explain, joint by joint.
+            The numbers of a USD file are rounded to single precision.
         frames: The interval for each pair of matching links, after the changes in `after`.
         as_written: The interval for the frame with the largest distance between the models as they are
             written. None if `after` is empty.
         written: (m, rad) proven bound on the distance and the angle of all pairs of matching frames, for the
             models as they are written. The bound is infinite if no bound was proven. If one model is a
             Denavit-Hartenberg table, only frames with the same name in A and B count.
-        narrowed: The mimicked joints whose mimic joint can leave its own limits. The value is a line of text.
-            The intervals still cover the whole range of the mimicked joint.
+        narrowed: One line of text for each joint whose mimic joint can exceed its own limits. The distances
+            in `frames` are nevertheless computed for the whole range of the mimicked joint.
         checked: Pinocchio's confirmation, or the reason why there is none.
         trees: The two robot models.
 
@@ -371,7 +377,10 @@ class Sameness(Displayable):
 
     @property
     def _verdict(self) -> str:
-        """The verdict in words, with the changes of B if it depends on them."""
+        """The verdict in words.
+
+        If the models are only the same after changes of B, the text lists these changes.
+        """
         after = self.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
@@ -399,9 +408,9 @@ class Sameness(Displayable):
 
     @property
     def worst_as_written(self) -> Interval | None:
-        """The interval for the frame that is farthest apart without the changes in `after`.
+        """The interval for the frame with the largest distance between A and B, if B is not changed.
 
-        In this comparison, A and B have equal coordinates.
+        A and B are compared at equal joint values.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -424,8 +433,9 @@ class Sameness(Displayable):
     def within_single(self) -> bool:
         """Whether the models differ by less than the bound on the error of single precision.
 
-        The models are compared as they are written. The sum of the roundings of all joints can be larger than
-        an error in one of them, so this does not prove that rounding is the cause: see `up_to_single`.
+        The models are compared as they are written. This bound is a sum of the rounding errors of all joints.
+        An error in one joint can be smaller than this sum. Therefore, the property does not prove that
+        rounding is the cause; `up_to_single` proves it.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -440,8 +450,8 @@ class Sameness(Displayable):
         """Return whether all matching frames are proven to be within a distance (m and rad) of each other.
 
         The models are compared as they are written: their roots coincide, and their coordinates are equal. A
-        different base, zero or tool therefore counts as a difference. The result is False if the types of two
-        matching joints differ, or if a joint exists in one model only.
+        different base pose, joint zero or tool frame therefore increases the distance. The result is False if
+        the types of two matching joints differ, or if a joint exists in one model only.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -466,7 +476,8 @@ class Sameness(Displayable):
         """Return 0 if the models are equivalent, or within the given distance; else 1.
 
         Args:
-            strict: Whether models that are only equivalent, or that have remarks, count as different.
+            strict: Whether the result is also 1 for models that are equivalent but not the same, and for
+                models with remarks, such as different joint limits.
             within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they
                 are written.
 
@@ -478,10 +489,10 @@ class Sameness(Displayable):
         return int(not self.holds(Question(within, strict)))
 
     def to_b(self, q: ArrayLike) -> FloatArray:
-        """Return B's configurations (..., nq) for A's configurations (..., nq).
+        """Convert A's configurations (..., nq) to the corresponding configurations (..., nq) of B.
 
-        At these configurations A and B have the same poses, except for `base`. Coordinates that only B has
-        get their values in the neutral configuration.
+        At corresponding configurations, A and B have the same poses, except for `base`. A coordinate that
+        only B has is set to its value in the neutral configuration.
 
         Raises:
             InputError: q does not have A's length.
@@ -622,15 +633,15 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 
 
 def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
-    """Decide which differing frames are tools, and return the changes that make B equal to A.
+    """Return the changes that make B equal to A, including changes of end-effector frames (tools).
 
     A change consists of its kind, which is an entry of `FREE`, and a line of text.
 
     Args:
-        found: The alignment of the models. The function changes the poses of its tools.
+        found: The alignment of the models. The function sets the tool poses in this alignment.
         rounding: The tolerance within which numbers are equal.
-        tables: Whether one model is a Denavit-Hartenberg table. The frames of a table depend on its
-            convention. All its frames that differ therefore count as tools.
+        tables: Whether one model is a Denavit-Hartenberg table. The poses of a table's frames depend on the
+            table's convention. Therefore, every frame that differs is treated as a tool.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = found.a.tree, found.b.tree
@@ -662,9 +673,9 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
 
 
 def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Two kinds of differing frames are tools: frames without children, and frames of the robot's mounting.
+    """Yield a pair for each changed tool: the kind "tools" and a line of text.
 
-    The function yields a pair for each tool: the kind "tools" and a line of text.
+    A frame that differs is a tool if it has no children, or if it describes how the robot is mounted.
     """
     around, links = _around(found), (found.a.tree.links, found.b.tree.links)
     for k, frame in enumerate(found.frames):
@@ -672,7 +683,7 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
         if frame.differs and (beside or tables or _is_tool(found, frame)):
             found.frames[k] = frame.put_right()
             if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
-                continue  # the line about the base already reports this pose
+                continue  # the line about the base already reports this difference
         if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -682,11 +693,11 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
 
 
 def _around(found: Alignment) -> set[tuple[int, int]]:
-    """Return those matching frames on the root body that only describe the mounting of the robot.
+    """Return the matching frames of the root body that only describe how the robot is mounted.
 
-    There are two kinds of such frames. The first kind is a link between the root and the first link to which
-    a moving joint is attached. The second kind is a link, such as a world or a table, that carries no moving
-    joint and has the same pose in the root frames of A and B.
+    Some of these frames are links before the first moving joint, counted from the root. The
+    other frames are links such as a world or a table: they carry no moving joint, and they have the same pose
+    in the root frames of A and B.
     """
     if found.a.body_of[found.base[0]] or found.b.body_of[found.base[1]]:
         return set()
@@ -704,11 +715,11 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 
 
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return two sets of links of the root body.
+    """Return two sets of links of the root body: links before the robot, and links beside the robot.
 
-    The first set has the links before the robot: all moving joints are below a fixed child of such a link.
-    The second set has the links beside the robot: no moving joint is below such a link. Both sets are empty
-    if no joint moves.
+    A link is before the robot if one of its fixed child links carries all moving joints, for example a
+    pedestal. A link is beside the robot if it carries no moving joint, for example a table. If the robot has
+    no moving joint, both sets are empty.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -750,7 +761,7 @@ def _rounded(x: float, rounding: float) -> float:
 def _is_tool(found: Alignment, frame: FramePair) -> bool:
     """Return whether a frame is fixed and has no children, in A as well as in B.
 
-    The child link of a mimic joint is not fixed and is therefore no tool, also if the multiplier is 0.
+    The child link of a mimic joint is no tool, even if the multiplier 0 keeps the joint from moving.
     """
     for tree, link in ((found.a.tree, frame.a), (found.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
@@ -786,8 +797,8 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
 def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree, link: str) -> bool:
     """Return whether a link belongs to matching rigid bodies in A and in B.
 
-    If they do not match, one of these bodies moves by a joint that only one model has. This joint is already
-    reported as a difference.
+    If the bodies do not match, only one of the two models has the joint that moves the body. `same` already
+    reports this joint as a difference.
     """
     alone_a = {found.a.body_of[j + 1] for j in found.only_a}
     alone_b = {found.b.body_of[j + 1] for j in found.only_b}
@@ -842,15 +853,16 @@ def remarks(
     *,
     as_written: bool = False,
 ) -> tuple[Difference, ...]:
-    """Return the differences without effect on motion: joint limits, joint types, links of one model only.
+    """Return the differences that do not affect motion: joint limits, joint types, links of only one model.
 
     Args:
         found: The alignment of the models.
-        variables: Their common variables.
+        variables: The common variables of the two models.
         tolerance: The tolerance within which numbers are equal.
-        single: The relative error of rounding a number to single precision; 0 if no model is rounded so.
-        as_written: Whether to compare limits as written, and not after the change of a joint's sense and zero
-            offset.
+        single: Relative error of a number that is rounded to single precision; 0 if both models have double
+            precision.
+        as_written: Whether to compare limits as written. Otherwise, B's limits are first converted to the
+            coordinate of A's joint.
     """
     some = list[Difference]()
     for step in found.steps:
@@ -877,9 +889,9 @@ def _in_order(which: str, value: Value) -> tuple[Value, Value]:
 
 
 def idle(joint: Joint) -> Lock | None:
-    """`same` compares a mimic joint with the multiplier 0 as a fixed joint.
+    """Return the `Lock` of a mimic joint with the multiplier 0; None for every other joint.
 
-    Return the `Lock` of such a joint, otherwise None.
+    `same` treats a mimic joint with the multiplier 0 as a fixed joint.
     """
     lock = joint.lock
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
@@ -894,8 +906,10 @@ def limit_differences(
         a: The joint of A.
         b: The joint of B.
         tolerance: Tolerance of a limit, relative to the larger of its absolute value and 1 (rad or m).
-        single: The relative error of rounding a limit to single precision; 0 if it is not rounded so.
-        zero: Sense and offset of B's coordinate. They convert the limits of B to the coordinate of A.
+        single: Relative error of a limit that is rounded to single precision; 0 if the limits have double
+            precision.
+        zero: Pair (sign, offset) with (value in B) = sign * (value in A) + offset. The function uses this
+            formula to convert B's limits to A's coordinate.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

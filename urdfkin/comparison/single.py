@@ -1,56 +1,62 @@
 """Prove joint by joint that single precision is the cause of every difference between two models.
 
-A bound on the displacement of a frame by rounding is a sum over all joints. It depends on the whole range of
-each prismatic joint. So the bound on rounding can be larger than an error in one joint. This proof has no
-such sum: each joint may differ by the rounding of its own numbers only.
+A bound on the displacement of a frame by rounding is a sum over all joints. This sum is larger for robots
+whose prismatic joints have long ranges. An error in one joint can be smaller than this sum, so a comparison
+with the sum does not detect the error. The proof in this module has no such sum: each joint may differ only
+by the rounding of this joint's own numbers.
 
-**What is compared.** The frames of a joint in its two bodies may be chosen freely, up to a motion along the
-axis, and a converter may add links or merge fixed ones. So the proof does not compare the numbers in the
-files. It compares quantities that do not depend on these choices. They are computed in the zero configuration
-and expressed in the frame of a link P. Each link that both models have has its own P. P is the nearest
-ancestor in A that both models have. The quantities are
+**What is compared.** Two files can describe the same joint by different frames. For example, the origin of a
+joint may be shifted along its axis, and a converter may add links or merge fixed links. Therefore, the proof
+does not compare the numbers in the files. It compares quantities that do not depend on the choice of frames.
+`same` computes these quantities for each link that both models have. The robot is in the zero configuration,
+and the quantities are expressed in the frame of a link P. P is the link's nearest ancestor in A that both
+models have, so different links have different ancestors P. The quantities are
 
 - the pose of the link;
 - the direction and the line of the axis of each joint between P and the link;
 - the multiplier and the offset of each mimic rule.
 
-By the product of exponentials, these determine the pose of each common link in every configuration. The
-models are compared as they are written. The roots coincide, and no joint sense, zero offset or tool frame is
-changed.
+By the product of exponentials, these quantities determine the pose of each common link in every
+configuration. The models are compared as they are written: the roots of A and B coincide, and no joint
+direction, joint zero or tool frame is changed.
 
-**The bound.** Let the path from P to the link have the joints 1 to n. Rounding can move the frame after joint
-i by w_i and turn it by e_i, as `urdfkin.verify.usd_check.single_precision` derives from the numbers of this
-joint. Let R_i be the constant rotation of joint i, and p_i its origin; a star marks the exact values. Then
+**The bound.** Let the joints 1 to n be the joints on the path from P to the link. Rounding can shift the
+frame after joint i by up to w_i, and rotate this frame by up to e_i. The function
+`urdfkin.verify.usd_check.single_precision` computes w_i and e_i from the numbers of joint i. Let R_i be the
+constant rotation of joint i, and p_i its origin. A star marks the exact values. Then
 
     R_1 ... R_n    and    R*_1 ... R*_n    are apart by at most    e_1 + ... + e_n,
 
-because angles of rotations add at most. Let W be the position error (m) and E the rotation error (rad) of the
-frame before joint i. The position error of the frame after the joint is then at most
+because the angle of a product of rotations is at most the sum of their angles. Let W be the position error
+(m) and E the rotation error (rad) of the frame before joint i. The position error of the frame after the
+joint is then at most
 
     W + E |p_i| + w_i,
 
 because R p_i - R* p*_i = (R - R*) p_i + R* (p_i - p*_i). The axis of joint i passes through the origin of the
-frame after the joint, and is fixed in this frame. So the position error and the rotation error of this frame
-also bound the errors of the axis. The multiplier and the offset of a mimic rule have a relative error of at
-most 2^-24.
+frame after the joint, and is fixed in this frame. Therefore, the errors of the axis are at most the position
+error and the rotation error of this frame. The multiplier and the offset of a mimic rule have a relative
+error of at most 2^-24.
 
-In B, the paths to P and to the link may branch at a common ancestor. Let W and E be the position error and
-the rotation error of the link relative to this ancestor. Let V and F be those of P. If the distance of the
-link from P is d, the position error of the link relative to P is at most W + V + F d. Its rotation error is
-at most E + F. The rounding errors of double precision, which `same` ignores, are added. If both models are
-rounded, their bounds are added.
+In B, P may be no ancestor of the link: the paths to P and to the link may branch at a common ancestor. Let W
+and E be the position error and the rotation error of the link relative to this common ancestor. Let V and F
+be the position error and the rotation error of P relative to the common ancestor. Let d be the distance
+between the link and P. Then the position error of the link relative to P is at most W + V + F d, and the
+rotation error is at most E + F. `same` ignores the rounding errors of double precision, so these errors are
+added to the bounds. If both models are rounded, the bounds of both models are added.
 
-**Both orders.** A link that only B has can be the parent of a joint, or P can be far from the joint in B.
-Then the bound contains the rounding of other joints. `same` therefore compares A with B, and B with A. In the
-comparison that starts with a rounded model, the path from P to the link must have at most one moving joint,
-and all its fixed joints must lie between P and the link. Otherwise, the difference is reported as
-not explained.
+**Both orders.** The bound for one joint can contain the rounding of other joints. This happens if the parent
+of the joint is a link that only B has, or if P is far from the joint in B. Therefore, `same` compares A with
+B, and also B with A. If the comparison starts with a rounded model, the path from P to the link must have at
+most one moving joint. In the other model, the path from the common ancestor to P must have no rounded joint.
+Otherwise, `same` reports the difference as not explained.
 
-**What the proof means.** If a difference exceeds its bound, single precision is not its cause. `same` names
-the first joint with such a difference. If no difference exceeds its bound, an error that is smaller than the
-rounding of the joint's own numbers may remain. Nothing can distinguish such an error from rounding. Some
-parts are not compared joint by joint: planar and floating joints, joints in another order, and links on other
-branches. They must agree up to double precision. Otherwise, the difference is reported as not explained.
+**What the proof means.** If a difference exceeds its bound, single precision is not the cause of this
+difference. `same` names the first joint with a difference that exceeds its bound. If no difference exceeds
+its bound, a joint can still have an error that is smaller than the rounding of the joint's own numbers. No
+comparison of the two models can detect an error of this size. The proof does not cover planar joints,
+floating joints, joints in another order, and links on different branches of A and B. These joints and links
+must agree up to double precision. Otherwise, `same` reports the difference as not explained.
 """
 
 from __future__ import annotations
@@ -74,13 +80,14 @@ from urdfkin.model.tree import FloatArray, inverse
 
 
 class JointComparison:
-    """The comparison of two aligned models as they are written, joint by joint.
+    """The comparison of two aligned models joint by joint, without changes of the models.
 
     Args:
-        found: The alignment. Only its pairs of joints and links are used.
-        joints: Bounds (joints, 3) of A and of B, as in `SinglePrecision.joints`. They are zero for a model in
-            double precision.
-        base: (4, 4) pose of B's root in A's root frame, for models as they are written.
+        found: The alignment of the two models. The class uses only the pairs of joints and links in this
+            alignment.
+        joints: Bounds (joints, 3) of A and of B, as in `SinglePrecision.joints`. The bounds are zero for a
+            model in double precision.
+        base: (4, 4) pose of B's root in A's root frame, for unchanged models.
         tolerance: The largest differences that count as rounding of double precision.
     """
 
@@ -96,7 +103,7 @@ class JointComparison:
         self.pairs = {frame.a: frame.b for frame in found.frames}
         self.steps = {step.a: step for step in found.steps}
         back = {b: a for a, b in self.pairs.items()}
-        #: The links at which the paths begin.
+        #: The link of A and the link of B at which the compared paths begin.
         self.start = (0, self.pairs[0]) if 0 in self.pairs else (back.get(0, 0), 0)
         self.pairs[self.start[0]] = self.start[1]
 
@@ -152,7 +159,7 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "is carried by other joints in the other model")
             return
-        # paths[1][0] is B's path back to the reference link.
+        # The list paths[1][0] contains the joints of B between the common ancestor and the reference link P.
         if self.joints[0].any() and (len(steps) > 1 or self.joints[1][paths[1][0]].any()):
             yield JointDifference(name, "", None, "is carried by joints without a common link between them")
             return
@@ -170,7 +177,7 @@ class JointComparison:
             beyond = list(self._beyond(joint, "axis", *self._between(step, *pair), bound[0] + bound[1]))
             if (
                 beyond and off
-            ):  # another origin of the link also moves the axis, so compare the axes in the frame of the link
+            ):  # a shifted link origin also shifts the axis, so compare the axes in the link's frame
                 seen = [screw.moved(inverse(T)) for screw, T in zip(pair, poses, strict=True)]
                 beyond = list(
                     self._beyond(joint, "axis", *self._between(step, *seen), sum(bound) + sum(bounds))
@@ -180,7 +187,8 @@ class JointComparison:
     def _between(self, step: Step, axis: Screw, other: Screw) -> tuple[float, float]:
         """Return the angle and the distance of two axes.
 
-        Only the distance from the other line is compared, because a point may lie anywhere along its axis.
+        The point of an axis may lie anywhere on this axis. Therefore, only the point's distance from the
+        other axis is computed.
         """
         ends = (axis, other) if self.joints[0].any() else (other, axis)
         return between(*ends, turns=step.kind == "turns")[1:]
@@ -188,13 +196,13 @@ class JointComparison:
     def _passed(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return the screws of the joints on a path, the pose at the end, and bounds (m, rad) for them.
+        """Return a path's joint screws and the pose at its end, with bounds (m, rad) on their errors.
 
         Args:
             which: 0 for A, 1 for B.
             back: The fixed joints from the last common link to the reference link. Results are in the frame
                 of this link.
-            path: The joints from the last common link to the end.
+            path: The joints from the last common link to the end of the path.
         """
         tree = self.mechanisms[which].tree
         start, own = np.eye(4), np.zeros(2)
@@ -204,7 +212,7 @@ class JointComparison:
         screws: dict[int, tuple[Screw, FloatArray]] = {}
 
         def placed() -> FloatArray:
-            """Return the bounds of a frame relative to the reference link, which is at the end of `back`."""
+            """Return the error bounds of the current frame relative to the reference link."""
             lever = float(np.linalg.norm((seen @ T)[:3, 3])) if back else 0.0
             return np.asarray(off + own + np.array([own[1] * lever, 0.0]))
 
@@ -215,7 +223,7 @@ class JointComparison:
         return screws, seen @ T, placed()
 
     def _after(self, which: int, joint: int, off: FloatArray) -> FloatArray:
-        """Return the bounds (m, rad) of the frame after a joint, from those of the frame before it."""
+        """Return the error bounds (m, rad) after a joint; `off` contains the bounds before the joint."""
         metres, radians = self.joints[which][joint, :2]
         length_of = self.mechanisms[which].tree.joints[joint].length
         return np.array([off[0] + off[1] * length_of + metres, off[1] + radians])
@@ -232,7 +240,7 @@ class JointComparison:
             yield JointDifference(place, what, None, " and ".join(sizes), explained)
 
     def _of_free_joint(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
-        """Compare a planar or floating joint, which must be the only joint of the root body.
+        """Compare a planar or floating joint, which must be attached to the root body.
 
         Yield its differences.
         """

@@ -55,8 +55,8 @@ from urdfkin.verify.verifier import checked_choice
 
 #: Number of configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: The frame with the largest distance between A and B is searched among this number of frames.
-#: These frames have the largest distances at random configurations.
+#: The search for the frame with the largest distance considers only this number of frames: the frames with
+#: the largest distances at random configurations.
 FARTHEST = 4
 #: Longest allowed path length, metres. The squares of longer lengths would overflow.
 LONGEST = 1e150
@@ -77,8 +77,8 @@ def same(
 
     By the product of exponentials T(q) = exp(S_1 q_1) ... exp(S_n q_n) H, the motion of a link depends on the
     screws S_i of the joints and on the link's pose H in the zero configuration. If the screws and poses of
-    two models agree, the models move alike for all q. The models may still differ in the base's pose, fixed
-    links, joint zeros and senses, names, the order of coordinates, and tool frames.
+    two models agree, the models move alike for all q. The models may still have different base poses, fixed
+    links, joint zeros, joint directions, names, coordinate orders and tool frames.
 
     Args:
         a: A robot, or a source for `load`.
@@ -116,7 +116,7 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
-    # A comparison makes many compiled trees. They are stored in copies, not in the user's robots.
+    # A comparison stores many compiled trees in the two robots, so it works on copies of the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 
@@ -148,7 +148,8 @@ class Comparator:
         given: For each joint name of A, the name of the matching joint in B.
         bounds: Whether to bound the largest distances.
         boxes: Largest number of boxes of configurations that exist at the same time.
-        within: Distance (metres and radians) that the bounds should prove; None if no distance is given.
+        within: Distance (metres and radians) for which the bounds should give a proof; None if no distance is
+            given.
     """
 
     def __init__(
@@ -210,7 +211,7 @@ class Comparator:
     def said(self, found: Alignment, variables: Variables) -> Sameness:
         """Return the result that follows from the alignment, without intervals and without confirmation.
 
-        The method also corrects the tools in `found`. A tool is a frame without children that differs
+        The method also sets the tool frames in `found`. A tool is a frame without children that differs
         between A and B.
         """
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
@@ -281,9 +282,9 @@ class Comparator:
         return metres, radians
 
     def unexplained(self, found: Alignment) -> tuple[JointDifference, ...]:
-        """Return the differences of the models as they are written, joint by joint, beyond rounding.
+        """Return the differences of the unchanged models that rounding does not explain, joint by joint.
 
-        The models are compared in both orders, because a bound depends on the link from which a joint is seen
+        The function compares A with B and also B with A, because the two comparisons have different bounds
         (`urdfkin.comparison.single`).
         """
         off = [
@@ -301,13 +302,11 @@ class Comparator:
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
     def as_written(self, found: Alignment) -> Alignment:
-        """Return the alignment of the models as they are written, for the joint and link pairs of `found`.
+        """Return the alignment of the unchanged models, with the joint and link pairs of `found`.
 
-        No sense, zero, tool or base is changed in this alignment, and the roots of the two models coincide.
-
-        The roots may have different names, and one model may also have a link with the name of the other
-        model's root. Then the two links of that name coincide instead. If one model is a Denavit-Hartenberg
-        table, only links with equal names count, because the poses of the other links depend on the table's
+        No joint direction, joint zero, tool frame or base pose is changed in this alignment.
+        `base_as_written` computes the pose of B's root. If one model is a Denavit-Hartenberg table, only
+        links with equal names are compared, because the poses of the table's other links depend on its
         convention.
         """
         a, b = self.mechanisms
@@ -340,9 +339,9 @@ class Comparator:
         return Search(self.robots, found, variables)
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
-        """Return the distance and angle (m, rad) between frames that ignored rounding differences can cause.
+        """Bound the distance and the angle (m, rad) between two frames that differ only by rounding.
 
-        Each joint can differ by a little rounding, and these differences add up along the path.
+        `same` ignores a small rounding difference at each joint, and these differences add up along the path.
 
         For a joint without limits, the sum uses the range in which the joint is sampled.
         """
@@ -383,9 +382,9 @@ class Comparator:
     def _most(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) for all frames.
+        """Return one bound (m, rad) that is valid for all frames.
 
-        The bound is sharpened only if the proof of `within` needs it.
+        The function improves the bound only if the improved bound can prove the distance `within`.
         """
         metres, radians = self.rounding(written, variables)
         uppers = self._uppers(written, variables)
@@ -480,7 +479,7 @@ class Comparator:
         return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(off.max(initial=0.0)))
 
     def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
-        """Return each frame's largest distance (m) from Pinocchio at `CONFIRMED` configurations."""
+        """Return each frame's largest distance (m) at `CONFIRMED` configurations, by Pinocchio."""
         search = self.search(found, variables)
         q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
         return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))
@@ -508,7 +507,7 @@ def _fixed_here(
     Args:
         tree: The tree.
         other: The other tree.
-        names: For each joint with another name in the other tree: that name.
+        names: For each joint with different names in the two trees: its name in the other tree.
         labels: A label for each link of both trees.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
@@ -531,9 +530,9 @@ def _with_idle_joints_fixed(
 ) -> KinematicTree:
     """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
 
-    Such a joint never moves. A mimic joint remains a mimic joint if the other model has a moving joint with
-    its name, above its child link, or with the name of `names`: then the two rules are compared. The
-    arguments are those of `_fixed_here`.
+    A joint with the multiplier 0 never moves. It remains a mimic joint if the other model has a matching
+    joint that moves: then `same` compares the two joints. Joints match by name (`names`), or by the label of
+    their child link. The arguments are described in `_fixed_here`.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     children = {labels[1][i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv}
@@ -551,11 +550,11 @@ def _with_idle_joints_fixed(
 def _spelled_alike(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Return a label for each link of two models, and pairs of joints with another spelling in USD.
+    """Return link labels of two models, and pairs of joints whose names differ only by USD's spelling.
 
-    A USD file contains another spelling of each name that USD does not allow, and several spellings are
-    possible. A name in the USD file counts as a spelling of a name in the other model if no second name of
-    that model has the same spelling.
+    USD does not allow all names, so a USD file contains other spellings of some names. Several spellings are
+    possible. A name in the USD file is matched to a name of the other model, unless a second name of the
+    other model has the same spelling.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -571,7 +570,7 @@ def _spelled_alike(
 
 
 def _originals(names: Sequence[str], spelt: Sequence[str]) -> dict[str, str]:
-    """For each name in the USD file that is another spelling of a name in `names`, return the latter."""
+    """Map each name that the USD file spells differently to the original name in `names`."""
     known, found = set(spelt), dict[str, set[str]]()
     for name in names:
         if name not in known:
@@ -581,10 +580,10 @@ def _originals(names: Sequence[str], spelt: Sequence[str]) -> dict[str, str]:
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of B's root in A's root frame for models that are compared as they are written.
+    """Return the pose (4, 4) of B's root in A's root frame, if the two models are not changed.
 
-    The roots may have different names, and one model may also have a link with the name of the other model's
-    root. Then the two links of that name coincide. Otherwise the two roots coincide.
+    The root body of one model may contain a link with the name of the other model's root. Then the two links
+    of this name coincide. Otherwise, the two roots coincide.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.homes[link])

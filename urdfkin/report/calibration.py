@@ -15,7 +15,7 @@ from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import counted
 
-#: If the ratio of the residuals to the stated noise is below this, the residuals are only rounding errors.
+#: If (residuals) / (stated noise) is below this number, the residuals are only rounding errors.
 _ROUNDING = 0.5
 
 

@@ -11,7 +11,7 @@ A change is a regression in these cases:
 - The ratio of the worst disagreement to the bound grew by more than this factor, and is above a tenth.
 
 A changed model is not a regression: its joints are listed with their axes, placements, limits and mimic
-rules. A new file name is not a regression either: robots are matched by the name in their text.
+rules. A renamed file is not a regression either: `compare` matches the robots by the robot name in the file.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from urdfkin.verify.oracles import versions
 
 #: Maximum length of a text; longer texts are truncated.
 _LONGEST = 200
-#: Precision of a displayed pose. Smaller changes are visible in the displayed distance.
+#: Precision of a displayed pose: numbers are rounded to nine decimals.
 _PRECISION = Tolerance(1e-9, 1e-9)
 
 
@@ -171,8 +171,8 @@ def _cell(value: Units | str) -> str:
 #: If the largest disagreement of a robot grows by more than this factor, the change is a regression. It may
 #: grow by a smaller factor, because the maximum over random samples varies.
 FACTOR = 2.0
-#: A largest disagreement below this number (in units of eps * scale) is no regression, because a single
-#: rounding error can have this size.
+#: If the largest disagreement is below this number (in units of eps * scale), a change of the disagreement is
+#: no regression. A single rounding error can be as large as this number.
 FLOOR = 2.0
 #: A disagreement below this fraction of its bound is no regression.
 _SHARE_FLOOR = 0.1
@@ -247,7 +247,10 @@ class ChangeEntry(TypedDict):
 
 
 class ComparisonDocument(Header):
-    """The output of `urdfkin report compare --format json`. Its header is that of the new report."""
+    """The output of `urdfkin report compare --format json`.
+
+    Its header entries are copied from the new report.
+    """
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
 
@@ -415,10 +418,7 @@ def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
 
 
 def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Yield a change for each code whose number of errors or warnings changed.
-
-    The verdict shows whether an error matters.
-    """
+    """Yield a change for each finding code (such as an error code) whose number of findings changed."""
     counts: list[dict[str, int]] = [{}, {}]
     for count, robot in zip(counts, (old, new), strict=True):
         for finding in robot["findings"]:

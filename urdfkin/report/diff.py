@@ -47,7 +47,7 @@ PAIRS = ("old", "new", "changes")
 
 
 def pairs_document(found: Sequence[Changes]) -> TextDocument:
-    """Return a table with a row for each pair of robots, and the changes of each pair."""
+    """Return a table with a row for each pair of robots, followed by the list of changes of each pair."""
     rows = [(*one.sources, headline(one)) for one in found]
     return TextDocument(
         "", [Table(PAIRS, rows, left=3), *(line for one in found if one for line in lines_of(one))]
@@ -64,7 +64,7 @@ def pairs_markdown(found: Sequence[Changes]) -> str:
 
 
 def lines_of(found: Changes) -> list[str]:
-    """Return a line for each change, and for each changed joint a line with the distance a frame moves."""
+    """Return the changes as lines; a changed joint also has a line with the distance that a frame moves."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
     for element, changes in _by_element(found).items():
         lines += [f"  {change}" for change in changes]

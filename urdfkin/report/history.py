@@ -1,8 +1,9 @@
 """History of robots in several validation reports: verdicts, results, findings and changes from run to run.
 
-Runs are ordered by their start. Robots are matched by their source, and renamed files by the robot's name, as
-in `compare`. Each report is read twice, so that only one at a time is in memory: once for its start, and once
-for its results. A report that cannot be used is listed with the reason; the others are shown.
+Runs are ordered by their start. Robots in two reports are matched by their source. If a file was renamed, its
+robot is matched by the robot's name, as in `compare`. Each report is read twice, first for its start time and
+then for its results, so that only one report at a time is in memory. A report that cannot be used is listed
+with the reason; the others are shown.
 """
 
 from __future__ import annotations
@@ -31,15 +32,15 @@ from urdfkin.verify.oracles import versions
 
 #: Largest number of reports in a history, and largest number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: Number of latest runs that a terminal marks for each robot; number of latest runs in the charts of the
-#: page.
+#: On a terminal, each robot has marks for the latest `MARKED` runs. On the page, the charts show the latest
+#: `CHARTED` runs.
 MARKED, CHARTED = 20, 60
 #: Number of latest changes that are shown without --all, and for each robot on the page.
 SHOWN = 20
 _LISTED = 500
 #: A mark for each verdict.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: The chart of disagreements begins at this power of ten of the bound.
+#: Lower end of the axis in the chart of disagreements: 10^-3 times the bound.
 _LOWEST = -3.0
 
 
@@ -138,7 +139,7 @@ class History:
 
     @property
     def exit_code(self) -> int:
-        """0 if every file was used, else 2."""
+        """The exit code: 0 if every file was used, otherwise 2."""
         return 2 if self.unusable else 0
 
     def as_dict(self, command: str | None = None) -> HistoryDocument:
@@ -169,7 +170,7 @@ def history(paths: Sequence[Path]) -> History:
         The runs in the order of their start, and the results of each robot in each run.
 
     Raises:
-        InputError: No report can be used, or there are too many.
+        InputError: No report can be used, or there are too many reports.
     """
     found = History()
     before: Document | None = None
@@ -236,7 +237,10 @@ def _in_folder(folder: Path) -> Iterator[Path]:
 
 
 def _in_order(files: Sequence[Path], found: History) -> Iterator[tuple[str, Document]]:
-    """Yield each report, ordered by start time. Record files that cannot be used, and repeated runs."""
+    """Yield each report, ordered by start time.
+
+    Add files that cannot be used to `found.unusable`, and repeated runs to `found.repeated`.
+    """
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:

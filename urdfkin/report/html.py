@@ -1,8 +1,8 @@
 """Report as an HTML page that works offline, uses no network and escapes every name.
 
-A large report is split: the page has the summary, and a file for each robot has its details. The page loads
-such a file when you unfold the robot. The files are scripts, because a page that is opened from disk cannot
-load other types of files.
+A large report is split: the page has the summary, and a file for each robot has its details. When you unfold
+a robot on the page, the page loads this robot's file. The files are scripts, because a page that is opened
+from disk cannot load other types of files.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
 
     Args:
         document: The report's data.
-        name: File name of the page. The folder of the robots' files is named after it.
+        name: File name of the page. For `report.html`, the robots' files are in the folder `report-robots`.
 
     Yields:
         The path of each file relative to the page, and its text. If all details together are longer than
@@ -170,7 +170,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
 
 
 def _summary(robot: Robot, index: int) -> dict[str, Any]:
-    """Return the data for the heading of a robot's section, which is visible while the section is closed."""
+    """Return the data for the heading of a robot's section; a closed section shows only its heading."""
     opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
     return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
 

@@ -4,8 +4,8 @@ A report has a test suite for each robot, with a test case for each quantity and
 has one suite, with a test case for each function.
 
 The layout conforms to the schema of Jenkins, junit-10.xsd. GitLab, GitHub actions and other programs read
-this layout. Some of these programs ignore the attributes of a failure. The text of the failure therefore
-contains all information.
+this layout. Some of these programs ignore the XML attributes of the element `failure`. The text of this
+element therefore contains all information.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _suite_element(
 
 
 def _incomplete(document: Document) -> bool:
-    """Whether the run has an error that belongs to no robot."""
+    """Whether the run has an error that concerns no single robot."""
     robots = document["robots"]
     return document["interrupted"] or not robots or len(robots) != document.get("asked", len(robots))
 

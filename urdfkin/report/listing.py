@@ -84,7 +84,7 @@ def fits(out: Console, table: Table) -> bool:
 
 
 def _cells(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
-    """Return the heading lines of the columns, the rows, and the width of each column."""
+    """Return the lines of the table's heading, the table's rows, and the width of each column."""
     from rich.cells import cell_len  # noqa: PLC0415
 
     lines = zip_longest(*(head.split("\n") for head in table.heads), fillvalue="")

@@ -33,7 +33,8 @@ _SHOWN = 3
 def as_markdown(document: Document) -> str:
     """Return the report as a comment.
 
-    Failed robots come first. A line states the number of robots that did not fit.
+    Failed robots come first. If the comment is too long, some robots are left out, and a line states their
+    number.
     """
     found = outcome_of(document)
     head = [

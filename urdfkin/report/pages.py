@@ -110,7 +110,7 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
 def _remaining_range(joint: Joint) -> str:
     """Return a sentence about the part of a joint's range in which its mimic joints are within their limits.
 
-    The text is empty if this part is the whole range.
+    The text is empty if the mimic joints do not narrow the range.
     """
     kept = joint.get("kept")
     if kept is None:
@@ -189,10 +189,11 @@ def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
 
 
 def _share(check: Check, subject: int) -> float:
-    """Estimate from above how much of its bound the largest disagreement of one frame, joint or column uses.
+    """Return an upper estimate of (disagreement / bound) for one frame, joint or column.
 
-    The document does not contain the bound of this result. The function divides by the smallest bound of all
-    results. It returns at most `share_of_bound`, the largest such fraction of the whole check.
+    The document does not contain the bound of a single frame, joint or column. Therefore, the function
+    divides the disagreement by the smallest bound of the check. The result is at most `share_of_bound`, which
+    is the largest ratio in the whole check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     if not value:  # a disagreement of 0 lies within every bound
@@ -205,7 +206,7 @@ def _share(check: Check, subject: int) -> float:
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
     """Return a table's rows as cells: joint, a, alpha, d, theta, and beta if a row has one.
 
-    The cell of the joint's variable also contains q.
+    The cell of theta (revolute joint) or d (prismatic joint) also contains q.
     """
     table = chain["standard"] if convention == "standard" else chain["modified"]
     return [_dh_cells(row, has_beta(chain)) for row in table["rows"]]

@@ -50,7 +50,7 @@ def moving_names(model: Model) -> list[str]:
 
 
 def column_names(model: Model) -> list[str]:
-    """Return the joint's name for each column of a Jacobian that also has columns for mimic joints."""
+    """Return the joint name of each Jacobian column, if mimic joints have their own columns."""
     return [joint["name"] for joint in model["joints"] for _ in range(_size(joint)[1])]
 
 
@@ -195,7 +195,7 @@ def _subjects(robot: Robot) -> dict[str, list[str]]:
 
 
 def _verdict(robot: Robot, samples: int) -> Iterator[str]:
-    """Yield contradictions of the verdict. A robot that is not verified needs a reason."""
+    """Yield contradictions between the verdict, its reason and the results of a robot."""
     verdict, reason = Verdict(robot["verdict"]), robot["reason"]
     second_differs = any(
         check["second_oracle"]["urdfkin"]["failed"] for check in robot["checks"] if "second_oracle" in check
@@ -256,8 +256,8 @@ def _check(check: Check, subjects: list[str], robot: Robot, document: Document) 
 def _share(check: Check) -> Iterator[str]:
     """Yield an error if `share_of_bound` contradicts the disagreements and bounds in the document.
 
-    The ratio must lie between the worst disagreement divided by the widest bound and the worst disagreement
-    divided by the tightest bound.
+    The smallest possible value of `share_of_bound` is the worst disagreement divided by the largest bound.
+    The largest possible value is the worst disagreement divided by the smallest bound.
     """
     share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])

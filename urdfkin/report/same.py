@@ -29,14 +29,14 @@ SHOWN = 12
 #: This line is printed if the models differ and their joints were not matched by name.
 GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
 HEADS = ("frame", "at least", "at most", "angle at most")
-#: Names of two attributes of `Interval`: the largest angle found, and the proven bound on the angle.
+#: Two attributes of `Interval`: the largest angle that was found, and the proven bound on the angle.
 TURNED = ("radians_seen", "radians")
 #: The default question: are the two robots equivalent?
 EQUIVALENT = Question()
-#: A distance is not printed if its bound is at most this factor times the rounding error of one number. The
-#: factor is larger than 1 because a sum adds the rounding errors of its terms.
+#: A distance is printed only if its bound is larger than DUST times the rounding error. DUST is larger than 1
+#: because the sum of several terms has additional rounding errors.
 DUST = 1.001
-#: Heading of the list of joints whose mimic joints leave their limits.
+#: Heading of the list of joints with mimic joints that can exceed their own limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -90,9 +90,9 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Return in words the largest distance and the largest angle between matching frames.
+    """Return a text with the largest distance and the largest angle between matching frames.
 
-    Return an empty text if distance and angle are within rounding.
+    The text is empty if distance and angle are only rounding errors.
     """
     lower, upper = (max((getattr(one, end) for one in frames), default=0.0) for end in ("lower", "upper"))
     seen, radians = (max((getattr(one, end) for one in frames), default=0.0) for end in TURNED)
@@ -110,9 +110,9 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Return in words the distance and the angle between a frame of A and the matching frame of B.
+    """Return a text with the distance and the angle between a frame of A and the matching frame of B.
 
-    Return an empty text if distance and angle are within rounding.
+    The text is empty if distance and angle are only rounding errors.
     """
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > DUST * rounding[0] else []
     parts += [up_to(angle, frame.radians_seen, frame.radians)] if frame.radians > DUST * rounding[1] else []
@@ -120,7 +120,7 @@ def _off(frame: Interval, rounding: tuple[float, float]) -> str:
 
 
 def far_frames(found: Sameness) -> list[Interval]:
-    """Return the frames that may differ between A and B by more than rounding, the farthest first."""
+    """Return the frames whose bound exceeds rounding, the frame with the largest bound first."""
     return sorted(
         (
             frame
@@ -134,7 +134,8 @@ def far_frames(found: Sameness) -> list[Interval]:
 def farthest(found: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    A result up to single precision is about the models as they are written, but this table is not.
+    The verdict "same up to single precision" is about the unchanged models. The distances in the table are
+    distances after the changes of B, so the heading lists these changes.
     """
     changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
     return f"Largest distance over all configurations within limits{changed}"
@@ -146,9 +147,9 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return in words the distance between a frame of A and a frame of B, without changes of B.
+    """Return a text with the distance between a frame of A and the matching frame of B, if B is not changed.
 
-    Return an empty text if the distance is within rounding.
+    The text is empty if the distance is only a rounding error.
     """
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
@@ -235,7 +236,7 @@ def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str,
 
 
 def pairs_document(found: Sequence[Sameness], question: Question = EQUIVALENT) -> TextDocument:
-    """Return a table of several pairs of models, and the first difference of each pair that differs."""
+    """Return a table of several pairs of models, followed by a line for each pair that differs."""
     rows = _pair_rows(found, question)
     different = [
         f"{one.sources[0]} and {one.sources[1]}: {headline(one, question)}"
@@ -441,7 +442,7 @@ def _bones(robot: Robot, Ts: FloatArray) -> FloatArray:
 
 
 def _axes(T: FloatArray, size: float) -> FloatArray:
-    """Return the axes of a frame as lines (3, 2, 3)."""
+    """Return the start and end points (3, 2, 3) of lines that show the three axes of a frame."""
     origin = np.tile(T[:3, 3], (3, 1))
     return np.stack((origin, origin + size * T[:3, :3].T), axis=1)
 
@@ -451,10 +452,10 @@ def _draw(
 ) -> dict[str, Any]:
     """Return one view.
 
-    The lines of the view are projected along the direction of view and scaled to the size of the picture.
+    The lines are projected along the viewing direction, and scaled to the size of the picture.
     """
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # The rows are the vectors in space that point right and down on the page.
+    # The first row is the direction in space that points right on the page; the second row points down.
     seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

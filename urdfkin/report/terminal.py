@@ -1,7 +1,7 @@
 """Report on a terminal: tables and the failures.
 
-A terminal of 80 columns shows two tables. A terminal of at least 100 columns shows one wide table. Colours
-only repeat information of the text.
+A terminal of 80 columns shows two tables. A terminal of at least 100 columns shows one wide table. The text
+contains all information that the colours show.
 """
 
 from __future__ import annotations

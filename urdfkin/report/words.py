@@ -47,7 +47,10 @@ def second_reader_words(robot: Robot) -> str:
 
 
 def units(value: Units, *, compared: bool = True) -> str:
-    """Format a disagreement. None means infinity (`inf`); the text is empty if nothing was compared."""
+    """Format a disagreement.
+
+    The input None is shown as `inf` (infinity). If nothing was compared, the text is empty.
+    """
     if not compared:
         return ""
     if value is None:
@@ -118,7 +121,7 @@ def worst_of(robot: Robot, names: Sequence[str]) -> str:
 
 
 def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
-    """Return the library with the smaller typical error, or `equal` if the two errors are the same double."""
+    """Return the library with the smaller typical error, or "equal" if both errors are the same number."""
     ours, theirs = line["urdfkin"]["typical"], line["pinocchio"]["typical"]
     return "equal" if ours == theirs else "urdfkin" if ours < theirs else "Pinocchio"
 
@@ -126,8 +129,8 @@ def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
 def nearer_counts(lines: Sequence[Judged]) -> str:
     """Return text that compares the errors of urdfkin and Pinocchio in the accuracy study.
 
-    The text contains the number of rows in which urdfkin's typical error is smaller than Pinocchio's. It also
-    contains the numbers of rows with equal errors and with a larger error.
+    The text contains three counts of lines of the study: urdfkin's typical error is smaller than Pinocchio's,
+    equal, or larger.
     """
     counts = Counter(nearer(line) for line in lines)
     return (
@@ -139,7 +142,8 @@ def nearer_counts(lines: Sequence[Judged]) -> str:
 def judged_on(judgement: Judgement) -> str:
     """Return a text about the result of the accuracy study.
 
-    The text states the number of samples, whether the base moved, and the numbers of `nearer_counts`.
+    The text states the number of samples and whether the base moved. It also contains the text of
+    `nearer_counts`.
     """
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
@@ -174,9 +178,9 @@ def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[st
 
 
 def second_oracle_cells(checks: Sequence[Check], title: str) -> list[str]:
-    """Return the cells under `second_oracle_heads` for several checks.
+    """Return the cells of a table row with the headings `second_oracle_heads`, for several checks.
 
-    For a pair of libraries, the cell contains the largest disagreement divided by its bound.
+    The cell of a pair of libraries contains the largest ratio of a disagreement to its bound.
     """
     found = [(check, check["second_oracle"]) for check in checks if "second_oracle" in check]
     return [

@@ -50,12 +50,13 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _BALLS = np.vectorize(exact, otypes=[object])
-#: The lines of the study for analytical Jacobians. Each line combines the results of several representations.
+#: The accuracy study has one line in its table for all sequences of Euler angles, and one line for
+#: quaternions.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
-#: urdfkin counts as less accurate if its typical or worst error exceeds Pinocchio's by more than this factor.
+#: urdfkin is called less accurate if its typical or worst error is more than FACTOR times Pinocchio's error.
 FACTOR = 2.0
 
 
@@ -126,11 +127,12 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
     acceleration.
 
     The study contains one line for the analytical Jacobians of all twelve sequences of Euler angles, and one
-    line for the analytical Jacobians of quaternions. Sequences about fixed axes are left out, because they
-    have the same Jacobians with the rows in reverse order. Samples nearer to a singularity than
-    `Robot.analytical_jacobian` accepts are skipped. Samples in which rounding hides the sign of the
-    quaternion are skipped too. Pinocchio computes no analytical Jacobians. Therefore, the study inserts the
-    rotation and the Jacobian of each library into eq. 7.122.
+    line for the analytical Jacobians of quaternions. Angles about fixed axes (such as roll, pitch and yaw)
+    are left out: they have the same Jacobians as the corresponding Euler angles, with the rows in reverse
+    order. Samples nearer to a singularity than `Robot.analytical_jacobian` accepts are skipped. A sample is
+    also skipped if rounding errors make the sign of the quaternion uncertain. Pinocchio computes no
+    analytical Jacobians. Therefore, the study inserts the rotation and the Jacobian of each library into eq.
+    7.122.
 
     Args:
         robot: The loaded robot.
@@ -242,8 +244,8 @@ class _Work:
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
     """Return indices (n, links, most) of the columns that move each link.
 
-    Here `most` is the largest number of such columns. If a link has fewer such columns, the array is filled
-    up with indices of columns that are 0.
+    Here `most` is the largest number of columns that move a link. For a link with fewer columns, the array
+    also contains indices of columns that are 0.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
@@ -263,7 +265,8 @@ def _one(base: BaseNumbers, k: int) -> BaseNumbers:
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
     """Return the unit quaternions (m, 4) of rotations (m, 3, 3).
 
-    Each result has the sign of the corresponding quaternion in `near`.
+    Quaternions q and -q describe the same rotation. The function chooses the sign of the corresponding
+    quaternion in `near`.
     """
     K = davenport(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T
@@ -285,7 +288,7 @@ def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -
 
 @partial(np.vectorize, otypes=[float])
 def _error(x: float, true: Number) -> float:
-    """Return an upper bound on |x - t|, where t is the true value, which an interval contains."""
+    """Return an upper bound on the error of `x`; the interval `true` contains the true value."""
     return float(abs(exact(true) - x).upper())
 
 

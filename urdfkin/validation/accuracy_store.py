@@ -1,8 +1,8 @@
 """Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
 The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks. The
-name of the file is the sha256 of all data on which the numbers in the file depend. Like the file of a chunk,
-the file contains a checksum.
+name of the file is the sha256 of all data on which the numbers in the file depend. The file contains a
+checksum.
 """
 
 from __future__ import annotations
@@ -79,7 +79,10 @@ class AccuracyResult:
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
-        """Return the results with the latest settings. None: no accuracy study was requested."""
+        """Return the results of the accuracy study that has the latest settings.
+
+        None: no accuracy study was requested.
+        """
         try:
             if (content := read_if_there(store.folder / JUDGE)) is None:
                 return None

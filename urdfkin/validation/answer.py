@@ -36,8 +36,9 @@ class Failure:
         reason: The reason as text.
         portrait: Summary of the robot, with only the parts of the robot that could be read.
         error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the process or the cluster caused the failure, and not the robot. Such a failure is
-            not stored, so that a resumed run computes the chunk again.
+        passing: Whether the cause of the failure is the process or the cluster instead of the robot. A
+            failure of the process or the cluster is not stored, so that a resumed run computes the chunk
+            again.
     """
 
     verdict: Verdict
@@ -99,7 +100,10 @@ _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """Error for a damaged file: its bytes are not the results of the chunk. The message states the reason."""
+    """Error for a damaged file, which does not contain the results of the chunk.
+
+    The message states the reason.
+    """
 
 
 def written(key: str, found: Answer) -> bytes:
@@ -114,7 +118,7 @@ def read(key: str, content: bytes) -> Answer:
     """Return the answer of a chunk from the bytes of its file.
 
     Raises:
-        DamagedError: The bytes are not the answer that was written for this chunk.
+        DamagedError: The file is damaged, or belongs to another chunk.
     """
     body = unpacked(key, content)
     try:
@@ -140,7 +144,7 @@ def unpacked(key: str, content: bytes) -> dict[str, Any]:
     """Return the data in the bytes of a file.
 
     Raises:
-        DamagedError: The bytes differ from those that `packed` returned for this key.
+        DamagedError: The content is damaged or belongs to another key.
     """
     checksum, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
     if not content.startswith(_MAGIC):

@@ -64,8 +64,8 @@ def validate(
 ) -> ValidationReport:
     """Compare every frame and joint with Pinocchio in all three reference frames.
 
-    `urdfkin.verify.quantities.compared()` lists the compared quantities, and `not_compared()` all other
-    quantities.
+    `urdfkin.verify.quantities.compared()` lists the quantities that are compared, and `not_compared()` lists
+    all other quantities.
 
     Args:
         robots: One robot or several: anything that `load` accepts, or loaded robots.
@@ -91,7 +91,7 @@ def validate(
         retry: "failed": repeat the check of robots that could not be checked before. Their files may have
             changed since then.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
-            covers only that part.
+            covers only this part of the work.
         progress: Callback, called before the work and after each chunk.
 
     Returns:
@@ -145,7 +145,7 @@ def validate(
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if _kernels_pay(len(missing) * samples) and (isolate or any(map(_is_robot, missing))):
-                load_kernels()  # first, so that no worker compiles and no robot's time includes compiling
+                load_kernels()  # compile here, not in the workers, so that no robot's time includes it
                 begin = time.perf_counter()
             collector.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
@@ -183,7 +183,7 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _is_robot(subject: RobotInput) -> bool:
-    """Return whether a robot can be loaded; if it cannot, its chunk reports the error."""
+    """Return whether a robot can be loaded. If not, the robot's first chunk reports the error."""
     try:
         subject.load()
     except Exception:
@@ -223,7 +223,7 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
 
 
 def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Judgement | None, ...], bool]:
-    """Return the requested accuracy result of each compared robot, and whether all robots have a result."""
+    """Return the accuracy results of the compared robots, and whether no result is missing."""
     if not store.has_judge:
         return (), True
     from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  needs python-flint
@@ -234,8 +234,8 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
 
 
-#: Smallest numbers of samples for which kernels save time: if the kernels are on disk (first number), and if
-#: they must be compiled (second number).
+#: Compiled kernels save time for runs with more samples than this. The first number applies to kernels on
+#: disk, and the second number to kernels that must be compiled.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 

@@ -85,7 +85,9 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk: error statistics, names and times. The first chunk also has the robot's summary.
+    """Result of a chunk: error statistics, names and times.
+
+    The result of the first chunk also contains the robot's summary.
 
     The sum of the results of two adjacent chunks is the result of the combined chunk.
     """

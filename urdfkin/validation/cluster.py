@@ -31,8 +31,8 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: At most _FOR_EACH * (threads of all workers) + _MORE chunks are in flight (sent and not yet answered).
-#: This maximum is so large that no thread waits for a chunk.
+#: At most _FOR_EACH * (threads of all workers) + _MORE chunks are in flight (sent and not yet answered). With
+#: this number of chunks, no thread waits for its next chunk.
 _FOR_EACH, _MORE = 2, 4
 #: Maximum number of times a chunk is sent when Dask loses its worker.
 #: A robot can only crash the process of its chunks, not Dask's worker.
@@ -86,7 +86,8 @@ def _client(scheduler: str) -> Iterator[Client]:
             with client:
                 yield client
             return
-        # Delete the client that failed: if the next client's thread deletes it, Dask waits for ever.
+        # Delete the client that failed in this thread. If the thread of the next client deleted it, Dask
+        # would wait for ever.
         gc.collect()
         keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
         raise ClusterError(
@@ -106,9 +107,9 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """Base class for Dask's scheduler and worker that serves no web page.
+    """Base class for a Dask scheduler and a Dask worker without a web page.
 
-    All users of the machine could open it.
+    All users of the machine could open such a web page.
     """
 
     def start_http_server(self, *_: object, **__: object) -> None:
@@ -206,7 +207,7 @@ class _Flight:
 
 
 class Cluster:
-    """Engine that keeps as many chunks in flight as the current workers can process."""
+    """Engine that keeps all current workers of a cluster busy with chunks."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -254,7 +255,7 @@ class Cluster:
             self._robots.clear()
 
     def _count(self) -> int:
-        """Return the number of chunks that may be in flight with the current workers."""
+        """Return the largest number of chunks that may be sent but not yet answered."""
         if time.monotonic() - self._counted > _COUNT and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
             self._room, self._counted = _FOR_EACH * threads + _MORE, time.monotonic()
@@ -272,7 +273,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Release the text of a robot that has no chunk in flight.
+        """Release the text of a robot if the workers have no chunk of this robot.
 
         If the robot is needed later, its text is sent again.
         """

@@ -1,8 +1,8 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
 Every requested robot has a report. A robot with missing answers is not verified. Results of adjacent chunks
-are added as they arrive, so memory does not grow with the number of samples. The sums follow the order of the
-chunks, so they do not depend on the order of arrival.
+are added as they arrive, so memory does not grow with the number of samples. Results are added in the order
+of the chunks, so the sums do not depend on the order of arrival.
 """
 
 from __future__ import annotations
@@ -80,7 +80,8 @@ class ResultCollector:
     def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
         """Add an answer.
 
-        `kept` is True for an answer from an earlier run, which does not count as work of this run.
+        `kept` is True if an earlier run computed the answer. The chunks of earlier runs are counted
+        separately.
         """
         robot = self._robots[task.robot]
         was_over, had_failed, before = robot.over, robot.has_failed, robot.done
@@ -171,8 +172,8 @@ class _Robot:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        # Leave out results of chunks after the failed chunk.
-        # The timing of the workers determines which of these chunks were computed.
+        # Leave out results of chunks after the failed chunk. Which of these chunks were computed depends on
+        # the speed of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._runs if run.start < last]

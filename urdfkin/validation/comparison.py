@@ -27,7 +27,7 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 
-#: Maximum size of one array of a block, bytes. About ten arrays of this size exist at a time.
+#: Maximum number of bytes of one array in a block of frames. About ten arrays of this size exist at a time.
 BLOCK_BYTES = 32 * 2**20
 
 
@@ -87,7 +87,7 @@ def frame_bytes(samples: int, nv: int) -> int:
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items of `size` bytes each into slices of at most `BLOCK_BYTES`.
+    """Divide `count` items into slices of at most `BLOCK_BYTES`, if each item has `size` bytes.
 
     Return at least one slice.
     """
@@ -109,7 +109,7 @@ class _Work:
 
 
 class _Block(_Work):
-    """The comparisons for a block of frames.
+    """The comparisons of urdfkin with the oracles for a block of frames.
 
     The block includes each joint whose child link is in the block.
     """
@@ -121,12 +121,13 @@ class _Block(_Work):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # The robot caches the compiled tree of all its frames. The tree of a block is compiled each time.
+        # The robot caches the compiled tree of all its frames. For a block of frames, the tree is compiled
+        # again.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
-        # The Jacobian of a joint is the Jacobian of its child link.
-        # In the list of frames, the links come first, beginning with the root.
+        # The Jacobian of the frame at a joint is the Jacobian of the joint's child link. In the list of
+        # frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
@@ -149,7 +150,7 @@ class _Block(_Work):
                     yield self._compare(joint, reference, ours[:, self.joint_rows], self.part(bound), second)
 
     def part(self, bound: Bound) -> Bound:
-        """Select the bounds of the joints in the block from the bounds of its frames."""
+        """Return the bounds of the block's joints; `bound` contains the bounds of the block's frames."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def asked(self, row: Quantity, reference: Reference | None) -> QueryBatch:
@@ -177,9 +178,10 @@ class _Block(_Work):
 
 
 class _Screws(_Work):
-    """Comparison of the columns of Pinocchio's `data.J`.
+    """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
 
-    Each column is a column of its joint's WORLD Jacobian.
+    Each column of `data.J` belongs to one joint. It equals a column of this joint's Jacobian in the reference
+    frame WORLD.
     """
 
     def tallies(self) -> Iterator[Tally]:

@@ -1,9 +1,10 @@
 """Find common mistakes that explain a wrong result of a user's function.
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
-and joints in another order. The module makes each mistake in urdfkin's own results. If they then agree with
-the user's results, the mistake is named. At every configuration, the remaining difference may be at most a
-thousandth of the original difference. If several mistakes lead to the same results, all of them are named.
+and joints in another order. The module makes each mistake deliberately in urdfkin's own results. If urdfkin's
+results with the mistake agree with the user's results, the mistake is named. They agree if the mistake makes
+the largest difference at least a thousand times smaller. If several mistakes lead to the same results, all of
+them are named.
 """
 
 from __future__ import annotations
@@ -29,9 +30,10 @@ if TYPE_CHECKING:
 EXPLAINED = 1e-3
 #: Largest number of explanations that are named.
 _MOST = 3
-#: Number of configurations at which exchanges of two joints are tried.
+#: Number of configurations that are used to test whether two joints are exchanged.
 _FEW = 4
-#: Differences are divided by their scale. If a scale is 0, the divisor is this fraction of the largest scale.
+#: Differences are divided by their scale. A scale that is 0 is replaced by the largest scale times this
+#: number.
 _LEAST = 1e-9
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
@@ -44,13 +46,13 @@ Inputs = tuple[FloatArray, ...]
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The data for a diagnosis: the function's results and urdfkin's results.
+    """The function's results and urdfkin's results, in which `diagnose` looks for common mistakes.
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
         found: The function's results (n, ...).
         expected: urdfkin's results.
-        scale: The scale of the bound of each number in `expected`.
+        scale: The scale in the bound k * eps * scale of each number in `expected`.
         compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
 
@@ -63,8 +65,8 @@ class Diagnosis:
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
         """Return the fraction of the difference that remains for predicted results.
 
-        `predicted` contains the first n results with a mistake. If they equal the user's results, the
-        fraction is 0.
+        `predicted` contains urdfkin's first n results with a simulated mistake. The fraction is 0 if
+        `predicted` equals the user's results.
         """
         scale = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
         with np.errstate(all="ignore"):
@@ -85,8 +87,8 @@ class Diagnosis:
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     """Return at most three sentences about the mistakes that explain the results; the list may be empty.
 
-    Each mistake is also combined with exchanged linear and angular halves of the six-vectors. Such a
-    combination is named only if no single mistake explains the results.
+    Each mistake is also combined with exchanged linear and angular halves of the six-vectors. A mistake
+    combined with exchanged halves is named only if no single mistake explains the results.
     """
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.exchanged_halves
@@ -95,7 +97,7 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     for words, predict in mistakes.all(case):
         try:
             predicted = predict()
-        except UrdfkinError:  # the mistake has no meaning for this robot
+        except UrdfkinError:  # this robot cannot have the mistake
             continue
         if predicted.shape != case.found.shape or case.is_expected(predicted):
             continue
@@ -109,7 +111,8 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     return []
 
 
-#: A sentence, and a function that returns the predicted results.
+#: A common mistake: a sentence that describes the mistake, and a function that returns urdfkin's results with
+#: this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -133,7 +136,7 @@ class Mistakes:
 
     @property
     def exchanged_halves(self) -> str:
-        """A sentence which states that the linear and angular halves of a six-vector are exchanged.
+        """A sentence for the mistake that the linear and the angular rows are exchanged.
 
         The sentence is empty if the quantity has no linear and angular halves.
         """
@@ -142,7 +145,7 @@ class Mistakes:
 
     @property
     def expected_halves(self) -> str:
-        """A sentence which states whether the linear or the angular rows come first in the convention."""
+        """A sentence that states which rows come first in the convention: the linear or the angular rows."""
         tool = "urdfkin" if self.conversion is None else self.conversion.convention.name
         return f"{tool} has the {'angular' if self._angular_first else 'linear'} rows first"
 
@@ -205,7 +208,7 @@ class Mistakes:
         yield "the term J a is missing", partial(case.compute, (q, v, zero))
 
     def _velocity(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the frame's velocity with the row order and the reference frame of the function."""
+        """Return the frame's velocity in the function's reference frame and row order."""
         q, v = self._ours((q, v))
         assert self.reference is not None
         found = self.robot.velocity(q, v, self.frame, self.reference, verify=False)
@@ -273,10 +276,9 @@ class Mistakes:
         return [(q, v) for _, q, v, turns in self._axes() if turns]
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return the data of each joint with one coordinate.
+        """Return a tuple (name, index in q, index in v, is an angle) for each joint with one coordinate.
 
-        The data of a joint are its name, its index in q, its index in v, and whether its coordinate is an
-        angle.
+        The indices are indices in the function's convention.
         """
         tree = self.robot.tree
         found = []
@@ -347,7 +349,7 @@ class Mistakes:
     def _of_joints(self, case: Diagnosis) -> Iterator[Mistake]:
         """Yield the mistakes about single joints: a reversed sign, or two exchanged joints.
 
-        In a Jacobian, the columns are changed in the same way as the coordinates.
+        If the quantity is a Jacobian, its columns are reversed or exchanged as well.
         """
         axes = self._axes()
         for name, q, v, _ in axes:
@@ -437,7 +439,7 @@ class Mistakes:
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
     """Yield mistakes that affect only some columns of a Jacobian.
 
-    The other columns may be right, or wrong for another reason.
+    The columns without this mistake may be right, or may be wrong for another reason.
     """
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return

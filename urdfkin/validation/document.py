@@ -40,7 +40,7 @@ class Mimic(TypedDict):
 class Kept(TypedDict):
     """The part of a joint's range in which its mimic joints are within their limits.
 
-    The value is null if there is no such part.
+    Both ends are null if the mimic joints exceed their limits everywhere in the range.
     """
 
     lower: Annotated[
@@ -378,7 +378,7 @@ class Timings(TypedDict):
 
 
 class SecondReading(TypedDict):
-    """Comparison of urdfkin's tree with the tree that a second reader makes from the same text."""
+    """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
 
     by: Annotated[str, says("Name and version of the second reader.")]
     joints: Annotated[Count, says("Number of joints compared in both readings, fixed joints included.")]
@@ -426,7 +426,8 @@ class Robot(TypedDict):
 class Document(Header):
     """The output of `urdfkin validate --json`.
 
-    Within a version of the layout, entries may be added, but no entry is removed or changes its meaning.
+    A version of the layout may receive new entries. An entry is removed or changes its meaning only in a new
+    version of the layout.
     """
 
     started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]

@@ -32,8 +32,8 @@ class Row:
 
     Attributes:
         robot: Index of the robot; -1 before the first task was taken.
-        index: Index of the latest chunk that was taken. A lower index means that more chunks of the robot are
-            left.
+        index: Index of the latest chunk that was taken. The lower this index, the more chunks of the robot
+            remain.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
@@ -68,7 +68,7 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, Row] | None:
-        """Return the next robot's first task and the robot's other tasks, for a worker without a robot.
+        """Return the first task of the next robot, and the robot's other tasks, for an idle worker.
 
         Return None if no task is left.
         """
@@ -91,7 +91,7 @@ class WorkQueue:
         return task
 
     def put_back(self, task: Task, row: Row) -> None:
-        """Put a task back into its `Row`, so that another worker can run it."""
+        """Put a task back into its robot's remaining tasks (`row`), so that another worker can run it."""
         row.put_back(task)
         self._begun.remove(row)
         self._waiting = chain([row], self._waiting)
@@ -112,7 +112,7 @@ IN_FLIGHT = 512
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A chunk of samples, with the index of its robot among the robots of the run."""
+    """A chunk of samples of one robot, and the index of this robot in the run."""
 
     robot: int
     chunk: Chunk
@@ -194,12 +194,12 @@ def _result(future: Future[Answer]) -> Answer:
 
 
 def lost(what: str, error: Exception) -> Failure:
-    """Return the answer for a robot with a chunk that could not be run, or whose answer was lost."""
+    """Return the failure of a robot with a chunk that could not be run, or whose answer was lost."""
     message = " ".join(str(error).split()) or "no message"
     return Failure(Verdict.NOT_VERIFIED, f"{what}: {type(error).__name__}: {message}", passing=True)
 
 
-#: Reasons that are reported for a robot that crashed its process.
+#: Reasons that the report states if a robot crashed its process.
 DIED = "the process that validated the robot crashed"
 DIED_TWICE = "the process that validated the robot crashed twice; the second time it computed nothing else"
 

@@ -1,13 +1,14 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
-A `Tally` contains the statistics of one quantity in one reference frame. Tallies of different samples can be
-added. The addition is commutative and associative, so the sum does not depend on the division of the samples
-into chunks. If two worst cases have the same ratio, the sum contains the case with the earlier sample.
+A `Tally` contains the statistics of one quantity in one reference frame. Two tallies can be added if they
+belong to different samples. The addition is commutative and associative, so the sum does not depend on the
+division of the samples into chunks. A sum of two tallies keeps the worse of the two worst cases. If both are
+equally bad, the sum keeps the case with the smaller sample number.
 
 With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
-Each pair of libraries has a bound. Two results agree if their difference lies within the bound of their pair.
-The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two results
-agree and the third one agrees with neither of them, the third one is the outlier.
+Each of the three pairs of libraries has its own bound. Two results agree if their difference lies within the
+bound of their pair. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two
+pairs. If two results agree and the third one agrees with neither of them, the third one is the outlier.
 """
 
 from __future__ import annotations
@@ -23,13 +24,13 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_of_each
 
-#: The three compared libraries, in the order of columns. The last library is the second oracle.
+#: The three compared libraries, in the order of the columns of tables.
 SIDES = ("urdfkin", "pinocchio", "second_oracle")
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Comparison of one library's results with the second oracle's.
+    """Comparison of one library's results with the results of the second oracle.
 
     Attributes:
         failed: Number of results outside their bound.
@@ -131,8 +132,8 @@ def three_sides(
 def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArray, FloatArray]:
     """Return two arrays (n, frames) of disagreements.
 
-    In the first array the disagreements are divided by their bounds. In the second array they are in eps *
-    scale.
+    The first array contains the ratios of disagreement to bound. The second array contains the disagreements
+    in eps * scale.
     """
     units = worst_of_each(one, other, bound.scale, 2)
     share: FloatArray = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
@@ -172,12 +173,13 @@ class Tally:
     """Error statistics of one quantity in one reference frame.
 
     Attributes:
-        results: Number of compared results; each is a matrix or a six-vector.
+        results: Number of compared results. A result is a matrix or a six-vector.
         failed: Number of results outside their bound.
         worst: The largest disagreement, in eps * scale.
         share: The largest ratio of a disagreement to its bound.
-        histogram: (82,) number of results in each bin. The first bin is below the first of `HISTOGRAM_EDGES`,
-            the last bin is above the last edge, and the others are between adjacent edges.
+        histogram: (82,) number of results in each bin of the histogram. The first bin contains results below
+            the first of `HISTOGRAM_EDGES`, and the last bin contains results above the last edge. Each other
+            bin is between two adjacent edges.
         by_frame: The largest disagreement of each frame, in the robot's order.
         case: The sample with the largest ratio.
         bounds: The smallest and the largest bound of all results, in eps * scale. The bound for a frame grows
@@ -212,7 +214,7 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Combine the statistics of other frames with the statistics of these frames.
+        """Return the common statistics of the frames in `self` and the frames in `other`.
 
         The two tallies must belong to the same samples.
         """

@@ -1,9 +1,9 @@
-"""Check a function of a user against urdfkin, the oracle and the derived bound.
+"""Compare a user's function with urdfkin and the oracle, within the derived bound.
 
 The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
-function at random configurations, at the zero configuration and at the joint limits. First, urdfkin's results
-at these configurations are compared with the oracle's results. If they agree, the function is the cause of
-any later disagreement.
+function at random configurations, at the zero configuration and at the joint limits. First, the module
+compares urdfkin's results at these configurations with the oracle's results. If urdfkin and the oracle agree,
+but the function disagrees with urdfkin, the error is in the function.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
-#: Number of configurations that are computed together, and number of configurations for a diagnosis.
+#: Configurations are computed in batches of `_AT_A_TIME`. A diagnosis uses `_DIAGNOSED` configurations.
 _AT_A_TIME = 256
 _DIAGNOSED = 48
 #: Largest number of exceptions and wrong shapes that are stored with their message.
 _KEPT = 5
-#: If the relative difference is at most this number, the diagnosis is "the function rounds to single
-#: precision".
+#: If a function's results differ from urdfkin's by this relative amount or less, the diagnosis is "the
+#: function rounds to single precision".
 _SINGLE = 1e-5
 
 
@@ -84,7 +84,7 @@ class WorstResult:
     replay: str
 
     def largest(self, rows: Sequence[str], columns: Sequence[str]) -> str:
-        """Return a sentence about the worst number, whose difference divided by its bound is largest."""
+        """Return a sentence about the number with the largest ratio of difference to bound."""
         with np.errstate(all="ignore"):
             over = np.abs(self.found - self.expected) / np.maximum(self.bound, np.finfo(float).tiny)
         flat = int(np.nan_to_num(over, nan=np.inf).argmax())
@@ -98,7 +98,7 @@ class WorstResult:
 
 @dataclass(frozen=True)
 class FunctionCheck(Displayable):
-    """The differences between a function's results, urdfkin's and the oracle's, relative to the bound.
+    """Result of `verify_function`: how far a function's results are from urdfkin's and the oracle's results.
 
     Attributes:
         function: Name of the function.
@@ -114,15 +114,15 @@ class FunctionCheck(Displayable):
         factor: The bound is multiplied by this factor.
         eps_scale: Largest difference in multiples of eps * scale.
         share: Largest ratio of a difference to the bound times `factor`; at most 1 if all results agree.
-        oracle_share: As `share`, for the difference between the function and the oracle. None without an
-            oracle.
+        oracle_share: Largest ratio of the difference between the function and the oracle to the bound times
+            `factor`. None without an oracle.
         rows: Largest ratio in each row of the result, by name.
         columns: Largest ratio in each column of a Jacobian; the key is the name of the joint velocity. Empty
             for other quantities.
         worst: The worst result; None if no result was compared.
         errors: Number of exceptions and wrong shapes.
-        first_errors: The texts of the first of these errors.
-        diagnoses: Explanations of a disagreement. Each explanation alone explains all results.
+        first_errors: The first exceptions and wrong shapes, with their texts.
+        diagnoses: Explanations of a disagreement. Each of these explanations is sufficient for all results.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -234,7 +234,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A wrapper of a robot's verifier. It also stores each checked call with its result."""
+    """A wrapper of a robot's verifier that also stores the arguments and the result of each checked call."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -272,8 +272,8 @@ def verify_function(
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
         robot: The robot whose kinematics the function computes.
-        quantity: Name of a row of the table of quantities: "placement", "velocity", "jacobian",
-            "jacobian rate", "hessian", "acceleration", "relative placement", "analytical jacobian" or "imu".
+        quantity: Name of the quantity: "placement", "velocity", "jacobian", "jacobian rate", "hessian",
+            "acceleration", "relative placement", "analytical jacobian" or "imu".
         frame: Name of a link or joint; None: the robot's only tip.
         reference: Reference frame of the result.
         convention: Convention of the function's inputs and results, one that `Robot.convention` accepts.
@@ -281,9 +281,10 @@ def verify_function(
         samples: Number of random configurations.
         seed: Seed of the random configurations.
         factor: Number that multiplies the bound, for a function that rounds more than the textbook's
-            recursion. The result's `needed_factor` is the smallest sufficient factor.
+            recursion. `FunctionCheck.needed_factor` is the smallest factor with which the check passes.
         batch: True: the function receives q (n, nq), and v and a (n, nv), and returns n results.
-        **options: Other arguments of the method of `Robot`, such as `representation`.
+        **options: Further arguments of the `Robot` method that computes the quantity, such as
+            `representation`.
 
     Returns:
         The result; `print` shows it. In a test: `assert check.agrees, check`.
@@ -351,8 +352,8 @@ class _Compared:
         good: Indices of the configurations with a result of the right shape.
         found: The function's results (n, ...) at the configurations in `good`.
         expected: urdfkin's results at the configurations in `good`.
-        scale: The scale of the bound of these results.
-        k: (n,) the factor k of the bound k * eps * scale, for each result.
+        scale: The scale in the bound k * eps * scale of each number in `expected`.
+        k: (n,) the factor k in the bound k * eps * scale of each result.
     """
 
     first: int
@@ -365,12 +366,12 @@ class _Compared:
     theirs: FloatArray | None
 
     def shares(self, other: FloatArray) -> FloatArray:
-        """Compare with another result; return the ratio of each difference to its bound."""
+        """Return the differences between `found` and `other`, divided by their bounds."""
         k = self.k.reshape(-1, *[1] * (self.found.ndim - 1))
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Compare with other results, and return each difference in units of eps * scale.
+        """Return the differences between `found` and `other`, in units of eps * scale.
 
         A difference that is not finite becomes inf.
         """
@@ -538,9 +539,10 @@ class _Run:
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
         """Return the rounding errors of a conversion, in eps * scale; they are 0 for a permutation.
 
-        The function receives an angle that the conversion has rounded. This angle differs from urdfkin's
-        angle by up to 2 eps |q|. The joint's rotation matrix, which is a factor of each term, is therefore
-        rotated by up to this angle. The matrix that converts a base velocity has at most 16 roundings.
+        The conversion rounds each joint angle before it is passed to the user's function. The rounded angle
+        differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix is rotated by
+        up to 2 eps |q|, and this matrix is a factor of each term of the result. The conversion of a base
+        velocity by a matrix has at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.how.row
         assert conversion is not None

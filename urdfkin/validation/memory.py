@@ -19,7 +19,7 @@ SHARE = 0.5
 #: Memory (bytes) that Pinocchio needs, measured with version 4.1.0.
 #: The workspace needs _FOR_CUBE * nv^3, and each link needs _FOR_LINK.
 _FOR_CUBE, _FOR_LINK = 64, 24_000
-#: Number of arrays that exist at the same time and have the size of a block of samples.
+#: A block of samples needs at most this number of arrays at a time, all with the size of the block.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
@@ -87,9 +87,9 @@ def _free() -> Iterator[int]:
 
 
 def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
-    """Yield the free bytes of a control group and of its parents, whose limits apply too.
+    """Yield the free bytes of a control group and of its parent groups, because all their limits apply.
 
-    In a container, the topmost visible group is the container's own group.
+    In a container, the last parent is the container's own group, because its parents are not visible.
     """
     folder = mount / group.lstrip("/")
     for place in (folder, *folder.parents):

@@ -25,7 +25,7 @@ class Verdict(StrEnum):
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run: 128 + SIGINT, as in shells.
 INTERRUPTED = 130
-#: The verdicts of a failed run, each with its wording for one robot and for several robots.
+#: The possible verdicts of a failed run, with words for one robot and words for several robots.
 _WORDS = {
     Verdict.DISAGREES: ("disagrees", "disagree"),
     Verdict.NOT_VERIFIED: ("is not verified", "are not verified"),

@@ -39,7 +39,8 @@ from urdfkin.model.tree import FloatArray
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Largest size of an answer in bytes, and largest number of bytes of standard error that a message quotes.
+#: An answer has at most _MOST bytes. An error message quotes at most _TAIL bytes of the program's standard
+#: error.
 _MOST = 64 * 2**20
 _TAIL = 300
 #: Number of failures in a row after which the program is not started again.

@@ -117,7 +117,7 @@ class RobotReport:
         return max((tally.worst for tally in self.of(quantity)), default=None)
 
     def replay(self, key: Key) -> str | None:
-        """Return a command that computes a quantity's worst case again, or None if there is no worst case."""
+        """Return a command that computes the worst result of a quantity again; None if there is none."""
         quantity, reference = key
         case = self.tallies[key].case
         return None if case is None else replay(self.origin, quantity, reference, case)
@@ -179,9 +179,9 @@ class RobotReport:
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
     """Return the command that computes a case again."""
     row = QUANTITIES[quantity]
-    # Joints are compared under their plain names, and a link may have the same name as a joint.
+    # The name of a joint can also be the name of a link, so the prefix "joint:" marks the joint.
     frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
-    origin = replace(origin, oracle=None)  # the command compares with Pinocchio, as this check does
+    origin = replace(origin, oracle=None)  # the command compares the result with Pinocchio
     return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
 
@@ -240,8 +240,8 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The command that repeats the run.
 
-        Each set of options has its own line. A robot that was passed as text is read from standard input.
-        Each such robot therefore has its own line.
+        Robots with the same options are on the same line. If a robot was passed as text, the command reads
+        the text from standard input. Each of these robots has its own line.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
@@ -267,7 +267,7 @@ class ValidationReport(Displayable):
     def as_dict(self) -> Document:
         """Return the JSON document.
 
-        An infinite disagreement, which may also result from NaN, becomes None.
+        If a disagreement is infinite or NaN, the document contains null.
         """
         judgements = iter(self.judgements)  # only compared robots have an accuracy result
         document = {

@@ -40,8 +40,8 @@ class RobotInput:
         source: A path, a catalogue name or the text of the URDF, as for `load`.
         origin: Source of the robot (also if `source` is the text) and its loading options.
         stamp: The sha256 of the robot's text; empty if the text cannot be read.
-        file: The file name in findings, if `source` is the text.
-        listed: Findings in the MJCF or USD file from which the text was converted.
+        file: The file name in errors and warnings, if `source` is the text of the robot.
+        listed: Findings (errors and warnings) about the original MJCF or USD file, if the text was converted.
         made: Whether the text was converted from another format than URDF.
     """
 
@@ -102,7 +102,7 @@ class RobotInput:
                 listed=self.listed,
                 made=self.made,
             )
-        robot.verifier.origin = self.origin  # the text read here may come from a file
+        robot.verifier.origin = self.origin  # the origin names the file from which the text was read
         return robot
 
     def load(self) -> Robot:
@@ -125,7 +125,7 @@ def subjects(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
-    """Return the robots as plain data, and, by index, the errors of the robots that cannot be read."""
+    """Return the robots as plain data, and a dict of reading errors with the robot's index as the key."""
     found, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:

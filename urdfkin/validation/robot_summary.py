@@ -110,7 +110,7 @@ def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
         try:
             tables = {name: dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
         except InputError:
-            continue  # a planar or floating joint on the path has no row
+            continue  # Denavit-Hartenberg tables contain no planar or floating joints
         if any(table.rows for table in tables.values()):
             found.append({"limb": limb, "base": base, "tip": tip} | _with_check(robot, oracle, tables))
     return tuple(plain(found))

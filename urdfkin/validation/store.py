@@ -36,8 +36,8 @@ _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
 JUDGE = "judge.json"
-#: Suffix of a file with the accuracy result of a robot.
-#: The accuracy store defines the key in the file's name.
+#: Suffix of a file with the accuracy result of a robot. `urdfkin.validation.accuracy_store` computes the key
+#: that is the name of the file.
 JUDGED = ".judged"
 _DONE, _FAILED = ".chunk", ".failed"
 
@@ -123,7 +123,7 @@ class Store:
             place.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files whose name belongs to no chunk, such as renamed files, and move them to `damaged/`."""
+        """Report files that have no chunk's name, for example renamed files, and move them to `damaged/`."""
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -286,7 +286,7 @@ def opened(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether another shard, which starts at the same time, may have created this file.
+    """Return whether this file may belong to another shard that starts at the same time.
 
     The other shard may create the file before it writes the manifest.
     """

@@ -56,7 +56,7 @@ class Clock:
             setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
-        """Set `compare` to the total time in seconds minus the times of all other parts."""
+        """Set the entry `compare` to the total time (s) minus the times of all other parts."""
         self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
 
     def as_dict(self) -> dict[str, Any]:

@@ -2,8 +2,8 @@
 
 The file `robots/features.toml` defines small robots with one feature of URDF each. For robots of the
 catalogue, the vectors contain the robot's name, not its URDF. The reader of `urdfkin.verify.exact` computes
-all values from the decimals of the URDF. The files depend on nothing but these texts: configurations are made
-from digests, not by a random generator.
+all values from the decimals of the URDF. The files depend only on these texts. Configurations are computed
+from digests of names instead of random numbers.
 """
 
 from __future__ import annotations
@@ -55,20 +55,21 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: Version of the file format of the test vectors.
-#: If its first number changes, programs for the old format cannot read the new files.
+#: Version of the file format of the test vectors. Programs that read version 1 can read all versions 1.x, but
+#: not version 2.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
-#: Number of configurations of each robot; the first is the zero configuration, as far as limits allow it.
+#: Number of configurations of each robot. The first is the zero configuration; a joint whose limits exclude
+#: zero has its limit nearest to zero.
 SAMPLES = 3
 #: Joint velocities, accelerations, and positions of planar and floating joints lie between -_RANGE and
 #: _RANGE.
 _RANGE = 2.0
-#: If the limits allow it, inputs are multiples of 1 / _GRID. Such an input has few decimals, and a double
-#: represents it exactly.
+#: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit. A multiple of
+#: 1 / 1024 has few decimals, and a double represents it exactly.
 _GRID = 1024.0
-#: Number of digits of a written tolerance, which is rounded up.
-#: Before that, the tolerance is rounded to `_SAME` digits.
+#: A tolerance is first rounded to `_SAME` digits. Then it is rounded up to `_DIGITS` digits, and written to
+#: the file.
 _DIGITS, _SAME = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -76,8 +77,8 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The quantities of the test vectors.
-#: The scale of a classical and of a spatial acceleration includes w x vel, which is their difference.
+#: The quantities of the test vectors. The classical and the spatial acceleration differ by w x vel. The scale
+#: of both accelerations includes this product.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -171,9 +172,9 @@ class Feature:
     Attributes:
         name: Name of the feature.
         rule: The standard's rule.
-        note: How libraries differ; None if no difference is known.
+        note: A known difference between libraries in this feature; None if no difference is known.
         text: The URDF.
-        data: The file: the text with its declaration, in its encoding.
+        data: The bytes of the URDF file: the encoded text with its XML declaration.
         frames: Links of the test vectors.
     """
 
@@ -275,7 +276,7 @@ def _tolerance(k: float, scale: float) -> str:
     """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
         return "0"
-    with localcontext(prec=_SAME):  # drop the last digits, in which processors may differ
+    with localcontext(prec=_SAME):  # drop the last digits, which may differ between processors
         number = +Decimal(k * max(EPS * scale, LEAST_UNIT))
     with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
         return str((+number).normalize())

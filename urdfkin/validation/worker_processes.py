@@ -46,7 +46,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            theirs.close()  # the worker now has the only copy, so the pipe closes when the worker ends
+            theirs.close()  # only the worker has this end of the pipe, so it closes when the worker ends
 
     @property
     def alive(self) -> bool:
@@ -60,7 +60,7 @@ class WorkerProcess:
         self._process.wait()
 
     def cause(self) -> str:
-        """Wait for a process that is ending, and return the cause."""
+        """Wait until the process has ended, and return the cause."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_GRACE)
         self.end()
@@ -115,7 +115,7 @@ def serve(pipe: int, parent: int) -> None:
 def _receive(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
     """Receive the next chunks while an earlier chunk is computed.
 
-    This process therefore detects at once that its parent has ended.
+    If the parent ends, the connection breaks, and this process ends at once.
     """
     try:
         while True:
@@ -161,8 +161,8 @@ class _Crew:
         work: The tasks of each robot.
         jobs: Maximum number of workers.
         enter: Callback that receives the answers.
-        alone: None: several workers may share a robot. Otherwise each worker has a single robot, and `alone`
-            is the reason that is reported if the worker crashes.
+        alone: None: several workers may share a robot. A text: each worker validates only one robot, and the
+            text is the reason in the report if the worker crashes.
     """
 
     def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
@@ -197,7 +197,7 @@ class _Crew:
             try:
                 worker = worker or self._start()
             except Exception as error:
-                if self._workers:  # no further process can be started, so continue with the running processes
+                if self._workers:  # a new process cannot be started, so continue with the running ones
                     self._queue.put_back(task, row)
                     return
                 self._enter_answer(task, lost("no process could be started", error))
@@ -239,7 +239,7 @@ class _Crew:
         self._enter(task, found)
 
     def _handle_crash(self, worker: _Worker, task: Task) -> None:
-        """Handle a crash: schedule the robot's tasks for a second try, or report the crash."""
+        """Schedule the tasks of the worker's robot for a second try, or report the crash."""
         self._workers.remove(worker)
         cause = worker.cause()
         if self._alone is None:
