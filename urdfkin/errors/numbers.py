@@ -60,7 +60,7 @@ def remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: For each accepted name of a unit: the short name.
+#: The accepted names of units, each with the unit's short name.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),

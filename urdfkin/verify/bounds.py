@@ -584,8 +584,8 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     angle is e_i, that of the middle angle is u, and that of the last angle is t = R e_k
     (`analytical_reference`). Let w be the angular part of a column of the velocity Jacobian. The column's
     element for the middle angle is u . w. The element for the first or last angle is r . w. Here r is the
-    reciprocal basis vector of the angle's axis. The lengths are |u| = 1 and |r| = 1 / s, where s = |e_i x t| is the sine
-    or cosine of the middle angle.
+    reciprocal basis vector of the angle's axis. The lengths are |u| = 1 and |r| = 1 / s.
+    Here s = |e_i x t| is the sine or cosine of the middle angle.
 
     Let the error of t be delta = k eps. Then u rotates by delta / s. Let r' be the reciprocal vector of t.
     Then r changes by the vector -(r . du) u - (r . dt) r'. The length of this vector is at most 2 delta /

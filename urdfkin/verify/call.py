@@ -33,8 +33,8 @@ class Part(NamedTuple):
         plan: The compiled tree.
         reference: Reference frame; placements ignore it.
         q: (n, nq).
-        rates: Arrays (n, nv): empty for a placement, (v,) for a velocity, (v, a) for an acceleration, for
-            example.
+        rates: The arrays v and a (n, nv) that the quantity needs: () for a placement, (v,) for a velocity,
+            and (v, a) for an acceleration.
         state: (n or 1, 24) state of the moving base.
         query: The same configurations for the oracle, converted independently from the user's arguments.
         options: Other arguments of the method, by name.
@@ -58,7 +58,7 @@ class Call:
         frame: Name of a link or joint, or several names.
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
-        given: Those of the inputs q, v and a that the quantity needs.
+        given: The inputs of the quantity: q, or q and v, or q, v and a.
         also: Additional frames; they are computed after the frames in `frame` and are not returned.
         options: Other arguments of the method, by name.
 
@@ -122,11 +122,11 @@ class Call:
 
     @property
     def results(self) -> int:
-        """Number of results that the call returns."""
+        """Number of results of the call: the number of configurations times the number of frames."""
         return self.n * len(self.links)
 
     def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
-        """Return the caller's array `out` in the shape (n, frames, ...) that the kernels need.
+        """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
         Subclasses of NumPy's array are rejected. For example, `reshape` of a NumPy matrix returns a different
         shape than requested. A kernel would then write past the end of the array.
@@ -152,14 +152,14 @@ class Call:
         return out.reshape(self.n, len(self.links), *own)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """Return a result (n, frames, ...) in the caller's batch shape.
+        """Reshape a result (n, frames, ...) to the batch shape of the caller's q.
 
         The result for a single frame has no axis for frames.
         """
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `evaluate`; if an input is not finite, raise an error that names the number."""
+        """Call `evaluate`. If an input is not finite, raise an error with the name of its joint."""
         try:
             return evaluate(*arguments, **options)
         except NotFiniteError:
@@ -175,7 +175,7 @@ class Call:
         return Part(self.plan, self.reference, self.q[part], rates, state, query, self.options)
 
     def index(self, k: int) -> tuple[int, ...]:
-        """Return the index in the caller's batch of sample k of the flat batch."""
+        """Convert the index k in the flat batch to indices in the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
 

@@ -3,8 +3,8 @@
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
 the conversion from the stage to the tree. Therefore `load` makes two comparisons:
 
-- with OpenUSD's own parser of UsdPhysics. The bodies, frames, degrees of freedom and limits of each joint
-  must be the same. A difference is an error.
+- with OpenUSD's own parser of UsdPhysics. Both parsers must find the same bodies, frames, degrees of freedom
+  and limits for each joint. A difference is an error.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
   robot in one configuration. In this configuration, each link must have the placement of its prim. The file
   states these transforms separately from the joint frames, so a difference is a warning about the file.
@@ -53,13 +53,13 @@ PATIENCE = 60.0
 #: Largest accepted size of the process's output, bytes.
 _MOST = 400_000_000
 #: Bound on the angle error (rad) of a joint's rotation in OpenUSD's parser, divided by `SINGLE`. `SINGLE` is
-#: the relative error of one rounding to single precision. Rounding the four numbers of a quaternion changes
-#: its angle by at most 2 `SINGLE`. The product of two quaternions adds an error of 4 `SINGLE` to each of the
-#: four numbers. These four errors form a vector of length 8 `SINGLE`. The angle error is twice this length:
-#: 16 `SINGLE`.
+#: the relative error of one rounding to single precision. If the four numbers of a quaternion are rounded,
+#: the rotation angle changes by at most 2 `SINGLE`. The product of two quaternions adds an error of 4
+#: `SINGLE` to each of the four numbers. The vector of these four errors has the length 8 `SINGLE`. The angle
+#: error is twice this length, that is, 16 `SINGLE`.
 _ROTATION = 18.0
-#: Number of roundings in the computation of a joint's origin. The scale factor, its product with the origin,
-#: and the transformed origin are rounded.
+#: Number of roundings in the computation of a joint's origin. The scale factor is rounded. Its product with
+#: the origin is rounded. The transformed origin is rounded.
 _ORIGIN = 3.0
 #: Bound on the angle error (rad) of one operation of a prim's transform, divided by u = `SINGLE`.
 #: Angles: up to three rotations, each of at most one turn, so each is off by at most 2 pi u, and errors add.
@@ -171,7 +171,10 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
 
 
 def _demand(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
-    """Compare both readings of a joint; return the largest ratio of a difference to its bound."""
+    """Compare urdfkin's and OpenUSD's data of a joint.
+
+    Return the largest ratio of a difference to its bound.
+    """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
     if ours[:3] != theirs[:3]:
@@ -207,8 +210,8 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint name: five numbers for the effect of rounding to single precision (see
-#: `urdfkin.urdf.usd.Usd.single`).
+#: Mapping from the name of a joint to five numbers. The numbers describe the effect of rounding to single
+#: precision (see `urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -219,9 +222,10 @@ class SinglePrecision:
     Attributes:
         links: (links, 2) largest position error (m) and angle error (rad) of each link, over all
             configurations.
-        joints: (joints, 3) for each joint in the zero configuration: largest position error (m) and angle
-            error (rad) of the next frame relative to the previous frame. The third number is the relative
-            error of the numbers in the joint's mimic rule.
+        joints: (joints, 3) three errors for each joint in the zero configuration. The first two are the
+            largest position error (m) and angle error (rad) of the child link's frame relative to the parent
+            link's frame. The third is the relative error of the multiplier and the offset in the joint's
+            mimic rule.
     """
 
     links: FloatArray
@@ -239,19 +243,18 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     m q + c is 2^-24 (|m q| + |c|), for the largest |q| within the limits.
 
     A stage states the pose A of a joint's frame in one body and its pose B in the other body. In the zero
-    configuration, the pose of the next frame is A B^-1. Let p be the origin of B. Let w be the sum of the
-    position errors of A and B, and let e be the sum of their angle errors. The angle error of A B^-1 is at
-    most e. Its position error is at most w + e |p|. For a revolute joint, the term e |p| is 0. If p is not
-    zero, urdfkin writes B as a separate fixed joint after the revolute joint. That fixed joint is not in
-    `single`, because the numbers of the revolute joint include the errors of B. For other joints, the last
-    number in `single` is |p|. A locked prismatic joint also displaces the next frame by its value q. The
-    absolute value of q is at most the length of the joint's constant offset plus the lengths of the two
-    origins.
+    configuration, the pose of the second body relative to the first body is A B^-1. Let p be the origin of B.
+    Let w be the sum of the position errors of the poses A and B. Let e be the sum of the angle errors of A
+    and B. The angle error of A B^-1 is at most e. The position error of A B^-1 is at most w + e |p|. For a
+    revolute joint, the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
+    the revolute joint. `single` has no entry for this fixed joint, because the entry of the revolute joint
+    includes the errors of B. For all other joints, the last of the five numbers in `single` is |p|. A locked
+    prismatic joint also displaces the child link by its value q. The absolute value of q is at most the
+    length of the joint's constant offset plus the lengths of the two origins.
 
     Args:
         tree: The robot.
-        single: Five numbers for each joint. The numbers of a joint that is not in `single` have no rounding
-            error.
+        single: Five numbers for each joint. A joint without an entry in `single` has no rounding errors.
     """
     out, own = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
@@ -273,7 +276,7 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
 
 
 def _largest(joint: Joint) -> float:
-    """Return the largest size of a joint's coordinate (rad or m) within its limits."""
+    """Return the largest absolute value (rad or m) that a joint's limits allow."""
     return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
 
 
