@@ -51,7 +51,7 @@ class Table:
         ]
 
     def _split_cells(self) -> list[list[tuple[str, str]]]:
-        """Split each cell and heading into its leading box-drawing characters, such as `├─`, and the rest."""
+        """Split each cell and heading into two texts: its leading characters such as `├─`, and the rest."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
             for row in (self.heads, *self.cells())

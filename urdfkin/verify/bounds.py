@@ -31,7 +31,7 @@ Measured differences are a fraction of an eps for each joint, because rounding e
 worst way. Reports state differences in multiples of eps * scale, because these multiples can be compared
 between robots.
 
-`magnitudes` runs the forward recursion. It replaces each vector by the length of the vector. The function
+`magnitudes` runs the forward recursion with the lengths of vectors instead of the vectors. The function
 evaluates eq. 7.58 and 7.127 to 7.130 with the number types of `urdfkin.kinematics.number_kinds`. With these
 number types, no intermediate value exceeds the result. Pinocchio computes one term differently. Eq. 7.129
 contains the term v_i w_{i-1} x z. Pinocchio computes v_i w_i x z instead. The difference is v_i^2 z x z,
@@ -125,7 +125,7 @@ def magnitudes(
 
 
 def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Compute `out` with NumPy; for one configuration, compute it with Python numbers."""
+    """Compute `out` with NumPy, or with Python numbers for a single configuration."""
     q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
     states = [tuple(_norm(base[at : at + 3]) for at in _OF_BASE)]
     for link in lengths.links:
@@ -275,7 +275,7 @@ def _step(link: _Link, state: State, q: Any, v: Any, a: Any) -> State:
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale above the range of doubles is inf; `disagreement` then accepts no result.
+#: A scale above the range of doubles is inf. If the scale is inf, `disagreement` accepts no result.
 _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -459,9 +459,10 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     joint velocities up to joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the
     length (w_k^2 - w_{k-1}^2) d_k. The sum of these lengths over all joints is the sum of w_k^2 times the
     length of link k, as in eq. 7.130. A vector d_k is the sum of the vectors between successive joint
-    origins. Its rounding errors are those of the sums in eq. 7.77. The breakdown of an acceleration for n
-    joints has 4 n terms. Adding these terms causes n + 3 rounding errors. The bound contains 2 eps for the
-    sums at each joint. This part of the bound exceeds the rounding errors of d_k and of the sum of 4 n terms.
+    origins. The rounding errors of d_k are those of the sums in eq. 7.77. The breakdown of an acceleration
+    for n joints has 4 n terms. Adding these terms causes n + 3 rounding errors. The bound contains 2 eps for
+    the sums at each joint. This part of the bound exceeds the rounding errors of d_k and of the sum of 4 n
+    terms.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -510,8 +511,8 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
     The length of a revolute joint's column is at most the length of the path to the frame. The linear rows of
-    this column are z x d. The speed at which the vector d changes is at most the bound on the speed of the
-    frame's origin. In LOCAL, J-dot is the derivative of components along the frame's axes, which rotate.
+    this column are z x d. The derivative of d is at most as long as the bound on the velocity of the frame's
+    origin. In LOCAL, J-dot is the derivative of components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -551,7 +552,7 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
 
     The numbers five, two and three in `_PAIR_TERMS` are sums of these counts. urdfkin needs the single
     product z x (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first rotates the two columns by
-    R. Then urdfkin computes two products. Each of them has the five factors R, z, R, z and d. The bound
+    R. Then urdfkin computes two products. Each product has the five factors R, z, R, z and d. The bound
     allows three products of four factors, which is more than these two products need.
     """
     shape = len(plan.frames), plan.nv, plan.nv
@@ -666,12 +667,12 @@ def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 
 
 def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
-    """Return a bool array (frames, 6, nv). It is False for the entries of a Jacobian that are always 0.
+    """Return a bool array (frames, 6, nv).
 
-    An entry is always 0 if it is 0 for every q and every motion of the base. The linear rows of a revolute
-    column are z x d. The vector d is 0 for every q if the path has no length and no prismatic joint. In
-    WORLD, this is the path from the root to the joint. In the other reference frames, this is the path from
-    the joint to the frame.
+    The array is False for the entries of a Jacobian that are 0 for every q and every motion of the base. The
+    linear rows of a revolute column are z x d. In WORLD, d is the vector from the root to the joint. In the
+    other reference frames, d is the vector from the joint to the frame. The vector d is 0 for every q if the
+    path between these points has no length and no prismatic joint.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]

@@ -27,7 +27,7 @@ _PLAIN = np.ndarray, np.memmap
 
 
 class Part(NamedTuple):
-    """A part of a call's configurations, as inputs of urdfkin's recursion and as inputs of the oracle.
+    """Some of the configurations of a call, converted for urdfkin and, independently, for the oracle.
 
     Attributes:
         plan: The compiled tree.
@@ -146,7 +146,7 @@ class Call:
                 if isinstance(out, np.ndarray) and type(out) not in _PLAIN
                 else None,
             )
-        self.question.read()  # an input list may contain views of `out`
+        self.question.read()  # read the inputs now, because they may be views of `out`
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a, because the check reads them again")
         return out.reshape(self.n, len(self.links), *own)
@@ -193,7 +193,7 @@ def _described(out: object) -> str:
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return whether `frame` is a list of names, and the names; a later lookup reports unknown names."""
+    """Return whether `frame` is a list, and return its names. Unknown names are reported later."""
     if isinstance(frame, str):
         return False, (frame,)
     try:

@@ -78,7 +78,10 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
-    """Return a line of text about the error of an OPW solver's forward kinematics, or None if unchecked."""
+    """Check the forward kinematics of an OPW solver, and return a sentence about its error.
+
+    If Pinocchio cannot check the robot, return None.
+    """
     if verifier.cannot() is not None:
         return None
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))

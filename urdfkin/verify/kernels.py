@@ -117,10 +117,11 @@ def _most(x, count):
 
 @kernel(ROWS, ROWS, ROWS, SCRATCH, WHOLE, SCRATCH, SCRATCH, WHOLE)
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
-    """Write the largest difference in each row; inf for a row that is not finite.
+    """Write the largest difference in each row to `out`. If a row contains inf or NaN, write inf.
 
-    If the scale has fewer rows, its rows are repeated. The arrays `out_bits` and `bits` are views of `out`
-    and `units` as integers, because the compiler can vectorize the maximum of integers.
+    If `scale` has fewer rows than `out`, its rows are repeated. The arrays `out_bits` and `bits` contain the
+    doubles of `out` and `units` as integers, because the compiler can vectorize the maximum of integers but
+    not of doubles.
 
     Args:
         ours: urdfkin's results.
@@ -173,8 +174,8 @@ def coupling(full, columns, index, factor, out):
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
-#: `_STATE` is the number of values in the state of a link. `_FREE` is the number of values in `free` for a
-#: planar or floating joint.
+#: The state of a link consists of `_STATE` values. The array `free` contains `_FREE` values for each planar
+#: and floating joint.
 _STATE = _FREE = 5
 
 

@@ -376,7 +376,7 @@ class MujocoOracle(Oracle):
         return S_rate
 
     def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
-        """Return the rotation of a floating or planar joint, and the number of its slide joints.
+        """Return the rotation of a floating or planar joint, and the number of slide joints that replace it.
 
         The rotation is an array (n, 3, 3) for a floating joint and (n, 2, 2) for a planar joint.
         """

@@ -143,7 +143,7 @@ class Layout:
     Args:
         model: Pinocchio's model.
         joints: Pinocchio's indices of the robot's joints, in order.
-        names: Their names.
+        names: Names of these joints.
         rules: The resolved rule of each mimic joint.
 
     Attributes:
@@ -197,7 +197,7 @@ class Layout:
         )
 
     def _rates(self) -> tuple[Places, FloatArray]:
-        """Return, for each joint velocity of Pinocchio, its index in v and its factor in G.
+        """Return two arrays over Pinocchio's joint velocities: the index in v, and the factor in G.
 
         The index and the factor are 0 for the base's velocities.
         """
@@ -261,7 +261,8 @@ class Frames:
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
         carriers: Mapping from the index of a link's frame to the index of the frame of the link's parent
-            joint. It contains no link whose frame has the same index as the frame of the parent joint.
+            joint. This mapping leaves out each link whose frame has the same index as the frame of its parent
+            joint.
     """
 
     def __init__(
@@ -522,9 +523,10 @@ class OracleQuery:
         frame: Name of a frame, or several names.
         reference: A `Reference` or its name.
         base: Motion of the base; None: fixed at the world origin.
-        inputs: q, or q and v, or q, v and a, as numbers that broadcast.
-        named: For each input: the original argument if it contains names, otherwise None.
-        joints: For each joint with coordinates, in order: its name and its number of joint velocities.
+        inputs: q, or q and v, or q, v and a, as arrays of numbers. Their batch shapes can differ (NumPy
+            broadcasting).
+        named: Original argument of each input, if this argument contains names; otherwise None.
+        joints: Name and number of joint velocities of each joint with coordinates, in order.
     """
 
     def __init__(
@@ -632,7 +634,8 @@ class Oracle:
             joints.
         mimic: True: couple mimic joints. False: every mimic joint moves freely.
         moving_base: Build the model on a free-flyer, which receives the base's motion.
-        root_joint: "floating" or "planar" if the tree has such a root joint, which the text does not contain.
+        root_joint: "floating" or "planar" if urdfkin has added a root joint of this kind to the tree. The
+            URDF text does not contain this joint.
         lock: Value (rad or m) of each locked joint, which is a fixed joint in the tree.
 
     Attributes:

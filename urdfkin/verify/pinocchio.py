@@ -5,8 +5,8 @@ PyPI project `pinocchio` is a different one: plugins for the test runner nose, i
 `pinocchio`. If both projects are installed, Python finds the module of the plugins first.
 
 The oracle shares no code with urdfkin's computation. The oracle reads the URDF text with Pinocchio's own
-parser. `urdfkin.verify.oracle` converts the user's original arguments a second time. It looks up each frame
-and the joint of each number of q in Pinocchio's model, and it converts the base's motion.
+parser. `urdfkin.verify.oracle` converts the user's original arguments a second time. That module finds frames
+and joints by their names in Pinocchio's model, and it converts the base's motion.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
 robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text a second time.
@@ -118,8 +118,8 @@ _SHALLOW = 100
 #: Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured), so the memory stays below 2 GB.
 MOST_RATES = 315
 
-#: Pinocchio's results are collected and copied to one array. This is the number of floating-point values that
-#: are copied at a time. They fit into the processor's cache.
+#: Pinocchio's results are collected and copied to one array. `_AT_A_TIME` is the number of floating-point
+#: values that are copied at a time. They fit into the processor's cache.
 _AT_A_TIME = 16384
 #: Function that returns the results for the next configurations; the argument is their number.
 _Next = Callable[[int], list[FloatArray]]
@@ -335,7 +335,6 @@ class PinocchioOracle(Oracle):
             yield self._layout.couple(block)
 
     def _frame_jacobians(self, x: QueryBatch) -> _Next:
-        """Return a function of m that returns the Jacobians of the frame for the next m configurations."""
         (one,), wanted = self._ids(x), self._reference(x.reference)
         found = self._each(self._pin.computeFrameJacobian, self._inputs(x, 1), one, wanted)
         return lambda n: list(islice(found, n))
@@ -433,11 +432,11 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     without columns, and returns a vector for one column.
 
     Args:
-        compute: Function with the argument m. It returns the results of all frames for the next m
+        compute: Function with the argument m, which returns the results of all frames for the next m
             configurations.
         n: Number of configurations.
-        memory: Array (rows, frames, ...) for the results. If it has n rows, it finally contains all results.
-            If it has only the rows of one block, each block overwrites the block before it.
+        memory: Array (rows, frames, ...) for the results. An array of n rows finally contains all results. In
+            a smaller array, each block overwrites the block before it.
     """
     if 0 in memory.shape:
         yield memory

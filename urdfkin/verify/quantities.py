@@ -65,16 +65,16 @@ class Quantity:
         equations: Equations of the textbook.
         compute: Function that returns urdfkin's results (n, frames, ...). Its arguments are (plan, *inputs,
             reference, base=, out=, threads=). If `recursive` is False, the arguments are different.
-        ask: Function with the arguments (oracle, query). It returns the oracle's results (n, frames, ...).
-        blocks: Generator with the arguments (oracle, query), for large results. It yields the oracle's
-            results for one block of configurations at a time.
-        scale: Function with the arguments (plan, magnitudes, reference). It returns the scale of the
-            quantity's bound (`urdfkin.verify.bounds`).
+        ask: Function with the arguments (oracle, query), which returns the oracle's results (n, frames, ...).
+        blocks: Generator with the arguments (oracle, query), which yields the oracle's results for one block
+            of configurations at a time. It is used for large results.
+        scale: Function with the arguments (plan, magnitudes, reference), which returns the scale of the bound
+            (`urdfkin.verify.bounds`).
         factors: Number of factors in the bound of the quantity (`urdfkin.verify.bounds`), for the reference
             frame LOCAL_WORLD_ALIGNED.
         against: Function with the arguments (oracle, part, ours, by). It returns the oracle's results and the
-            bound. A quantity with this function is checked without `ask` and `scale`.
-        exact: Function with the arguments (motion, link, reference). It returns intervals that contain the
+            bound. If a quantity has this function, its check does not call `ask` and `scale`.
+        exact: Function with the arguments (motion, link, reference), which returns intervals that contain the
             true values. The accuracy study and `Robot.enclose` call this function.
         recursive: True if the forward recursion computes the quantity for any frames.
         validated: True if `validate`, the accuracy study and plots include the quantity. The Hessian is not
@@ -156,7 +156,7 @@ class Quantity:
         return bound
 
     def truth(self, motion: Any, link: int, reference: Reference | None) -> NDArray[Any]:
-        """Return the exact values of one link."""
+        """Return the intervals that contain the true values of the quantity for one link."""
         assert self.exact is not None
         values: NDArray[Any] = self.exact(motion, link, *self._in(reference))
         return values

@@ -194,8 +194,8 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # If an arm has fewer joints than the Jacobian has rows, the frame cannot move in some directions in
-        # any configuration. These directions depend on the configuration.
+        # If an arm has fewer joints than the Jacobian has rows, every configuration has directions in which
+        # the frame cannot move. These directions depend on the configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -222,7 +222,7 @@ class _Explanation:
         return usual, U[:, int((s > _USUAL * s[0]).sum()) :]
 
     def _without_noise(self, rows: FloatArray) -> FloatArray:
-        """Return vectors in which numbers up to the size of the Jacobian's error are replaced by 0."""
+        """Replace the numbers that are not larger than the error of the Jacobian by 0."""
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
     def _directions(self, lost: FloatArray) -> Iterator[str]:
@@ -258,7 +258,7 @@ class _Explanation:
     def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
         """Yield each set of linearly dependent columns that contains no smaller dependent set.
 
-        A set contains indices of columns. Only the columns of joints that move the frame are counted.
+        A set contains indices of columns. Columns of joints that do not move the frame have no index.
         """
         if self._A.shape[1] > _MOST_COLUMNS:
             return
@@ -352,7 +352,10 @@ class _Explanation:
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return the line that all axes intersect, if the lost direction defines such a line; else None."""
+        """Return the line that all joint axes intersect.
+
+        If the lost direction defines no such line, return None.
+        """
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -407,7 +410,7 @@ def _basis(rows: FloatArray) -> FloatArray:
     The rows are orthogonal projections of orthonormal vectors.
     """
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
-    return Vt[: int((s > 0.5).sum())]  # each singular value of such rows is 1 or 0
+    return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding
 
 
 def _cross_matrix(z: FloatArray) -> FloatArray:

@@ -205,7 +205,7 @@ def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, floa
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    """Return the largest ratio of a difference to its unit; 0 / 0 counts as 0."""
+    """Return the largest ratio of a number in `found` to its unit. If both are 0, the ratio is 0."""
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
@@ -246,7 +246,7 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """Lengths and velocities of the robot. The bounds on rounding errors are proportional to them.
+    """Lengths and velocities to which the bounds on rounding errors are proportional.
 
     Attributes:
         reach: (n,) length of the path from the root to the table's base plus length of the path from the root

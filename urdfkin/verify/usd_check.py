@@ -61,15 +61,17 @@ _ROTATION = 18.0
 #: Number of roundings in the computation of a joint's origin. The scale factor is rounded. Its product with
 #: the origin is rounded. The transformed origin is rounded.
 _ORIGIN = 3.0
-#: Bound on the angle error (rad) of one operation of a prim's transform, divided by u = `SINGLE`.
-#: Angles: up to three rotations, each of at most one turn, so each is off by at most 2 pi u, and errors add.
-#: Quaternion: the errors of its numbers form a vector of length u at most. The part across the quaternion
-#: turns by 2 u at most. The part along it changes its length by u; UsdGeom does not normalize it, so that a
-#: rotation by t is off by 2 u sin t at most. Together 4 u.
-#: Matrix: the errors of its nine numbers form a vector of length sqrt(3) u at most, and removing the scales
-#: of the rows makes it no longer. A rotation by a small angle t changes the matrix by a vector of length
-#: sqrt(2) t, so the rotation is off by at most sqrt(3/2) u.
-#: The largest of the three is the bound. `_at_rest` counts one operation for each joint on the path.
+#: Bound on the angle error (rad) of one operation of a prim's transform, divided by u = `SINGLE`. A rotation
+#: from angles consists of at most three rotations of at most one turn. The error of each is at most 2 pi u,
+#: so their sum is at most 6 pi u. A quaternion has four rounded numbers. Their errors form a vector whose
+#: length is at most u. The component of this vector perpendicular to the quaternion changes the rotation by
+#: at most 2 u. The component parallel to the quaternion changes the length of the quaternion by at most u.
+#: UsdGeom does not normalize a quaternion. Therefore, this component changes a rotation by the angle t by at
+#: most 2 u sin t. The sum of both changes is at most 4 u. A matrix has nine rounded numbers. Their errors
+#: form a vector whose length is at most sqrt(3) u. Normalizing the rows does not make this vector longer. A
+#: rotation by a small angle t changes the matrix by a vector of length sqrt(2) t. Therefore, the error of the
+#: rotation is at most sqrt(3/2) u. The bound is the largest of these three values. `_at_rest` counts one
+#: operation for each joint on the path.
 _TRANSFORM = 6.0 * np.pi
 
 
@@ -155,7 +157,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
         read: The result of `read_usd`.
 
     Returns:
-        A line of text about the result, for the certificate; and remarks about prims whose placements differ.
+        Two values: a sentence for the certificate, and remarks about prims whose placements differ.
 
     Raises:
         OracleError: OpenUSD's parser reads another joint.
@@ -248,9 +250,9 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     and B. The angle error of A B^-1 is at most e. The position error of A B^-1 is at most w + e |p|. For a
     revolute joint, the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
     the revolute joint. `single` has no entry for this fixed joint, because the entry of the revolute joint
-    includes the errors of B. For all other joints, the last of the five numbers in `single` is |p|. A locked
-    prismatic joint also displaces the child link by its value q. The absolute value of q is at most the
-    length of the joint's constant offset plus the lengths of the two origins.
+    includes the errors of B. For all other joints, `single` contains |p| as the last of five numbers. A
+    locked prismatic joint also displaces the child link by its value q. The absolute value of q is at most
+    the length of the joint's constant offset plus the lengths of the two origins.
 
     Args:
         tree: The robot.
@@ -319,7 +321,7 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
     if remarks:
         words = f"by UsdGeom's transforms {len(remarks)} of the {len(prims)} prims are elsewhere, by up to"
         words = f"{words} {worst[0]:.3g} m"
-        # if several bodies of a chain differ, the first of these bodies is the cause
+        # an error of one body moves all bodies after it, so only the first is reported
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

@@ -113,7 +113,7 @@ class Verifier:
 
     def __getstate__(self) -> dict[str, Any]:
         # Pinocchio's models are rebuilt when needed. A copy of a verifier has not yet checked any results, so
-        # the copy begins with an empty record.
+        # the copy gets a new, empty ledger.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
@@ -268,7 +268,8 @@ class Verifier:
 
         Args:
             name: Name of a quantity.
-            compute: Function of the inputs and `out` for one configuration; None for unsupported arguments.
+            compute: Function that computes one configuration from the inputs and writes the result to `out`;
+                None if the arguments are not supported.
             plan: The compiled tree of the frame.
             frame: Name of the frame, as the user gave it.
             reference: Reference frame of the results.
@@ -467,9 +468,8 @@ def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Boun
 
     NumPy can broadcast the bound to the shape of the results.
 
-    If a path contains no prismatic joint, its length is the same in every configuration. Some bounds depend
-    only on the lengths of such paths and on a fixed base. Such a bound is computed only once, for one
-    configuration.
+    If a path contains no prismatic joint, its length is the same in every configuration. Therefore, the bound
+    on a placement or a Jacobian of a robot on a fixed base is computed only once, for one configuration.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0
@@ -489,7 +489,7 @@ def own_results(quantity: Quantity, x: Part) -> FloatArray:
 
 
 def _not_finite_is_known() -> np.errstate:
-    """Silence NumPy's warnings: a value that is not finite counts as a disagreement."""
+    """Suppress NumPy's warnings about inf and NaN, because the comparison reports these values."""
     return np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -526,7 +526,7 @@ def checked_choice(verify: object) -> Verify:
 
 
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
-    """Yield the indices of the configurations to check, in parts.
+    """Divide the configurations that are checked into parts. Yield the indices of each part.
 
     Args:
         verify: True or "sample".

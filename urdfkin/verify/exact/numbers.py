@@ -35,9 +35,9 @@ from urdfkin.verify.bounds import Conversion
 DIGITS = 50
 #: A double has 15 decimal digits. This constant is twice as large.
 _TWO_DOUBLES = 30
-#: Number of bits for each decimal digit, and number of additional bits. Arb stores an interval as a midpoint
-#: and a radius. A midpoint of 53 bits can make the interval four times as wide as the distance between two
-#: doubles. Therefore, 55 bits are used for 15 digits, the precision of a double.
+#: A decimal digit needs `_BITS` bits. Intervals are computed with `_MORE_BITS` additional bits. Arb stores an
+#: interval as a midpoint and a radius. A midpoint of 53 bits can make the interval four times as wide as the
+#: distance between two doubles. Therefore, 55 bits are used for 15 digits, the precision of a double.
 _BITS, _MORE_BITS = math.log2(10.0), 5
 #: Number of significant digits of a written decimal: 17 digits determine every double. The module `decimal`
 #: computes with `_ALL_DIGITS` digits before a decimal is rounded.
@@ -306,13 +306,13 @@ class _Text:
         return self.quaternions and origin is not None and "quat_xyzw" in origin.attrib
 
     def rotation(self, origin: Element | None) -> Matrix:
-        """Return the rotation of `rpy` or, from URDF 1.1 on, of the quaternion `quat_xyzw` of any length."""
+        """Return the rotation of an origin, from its attribute `rpy` or, since URDF 1.1, `quat_xyzw`."""
         if origin is not None and self.has_quaternion(origin):
             return from_quaternion(self.numbers(origin, "quat_xyzw", ""), self.kind)
         return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.kind)
 
     def rule(self, name: str) -> tuple[Number, Number]:
-        """Return the multiplier and the offset of a mimic joint relative to its independent joint."""
+        """Return M and C of a joint with the value M q + C, where q is the value of the independent joint."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -348,9 +348,9 @@ class _Text:
         return Conversion(angles, rules, np.array(lengths))
 
     def value(self, name: str, at: Mapping[str, Any]) -> _Value:
-        """Return the absolute value and the error of a joint's coordinate.
+        """Return bounds on a joint's coordinate and on the rounding error of this coordinate.
 
-        `at` contains the independent joints' values.
+        `at` contains the values of the independent joints.
         """
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:

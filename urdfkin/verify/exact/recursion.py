@@ -78,7 +78,7 @@ def move(
     *,
     base: State | None = None,
 ) -> Motion:
-    """Return the motion, in one sample, of the root link and of the child link of each joint.
+    """Return the position, velocity and acceleration of each link in one sample.
 
     Args:
         tree: The robot.
