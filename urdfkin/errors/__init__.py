@@ -37,8 +37,8 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
         word: The misspelt name.
         known: The existing names.
         cutoff: Least similarity, from 0 to 1.
-        work: Largest number of pairs of characters to compare. When it is reached, `nearest` returns the
-            names found so far.
+        work: Largest number of pairs of characters to compare. When the limit is reached, `nearest` returns
+            the names found so far.
 
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']

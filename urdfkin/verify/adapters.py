@@ -103,7 +103,7 @@ def _rigid(R: Any, p: Any) -> Any:
 
 
 def _relative(poses: Poses, root: str) -> Poses:
-    """Return link poses relative to the root link; a root merged into the world is at the world's origin."""
+    """Return link poses relative to the root link. A missing root link has the identity pose."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 

@@ -381,8 +381,8 @@ def against_true_values(
     The error of a revolute mimic joint's value rotates all later vectors of the path. An angle error of 1 eps
     rad changes a vector by at most eps times the length of the vector.
 
-    The displacement of a prismatic mimic joint has an error of at most 3/2 r X eps, because no term of X has
-    more than 3 r roundings. This bound is valid for separate rules and for a combined rule. If the offsets of
+    Each term of X is rounded at most 3 r times, so the displacement of a prismatic mimic joint has an error
+    of at most 3/2 r X eps. This bound is valid for separate rules and for a combined rule. If the offsets of
     a chain cancel each other, |M q| + |C| is far below X. Therefore, the function uses X as the length of
     such a joint's displacement. Then a rounding error of 3/2 eps for each rule is enough. The same error is
     enough for the joint's velocity and acceleration, which are rounded less often.
@@ -415,8 +415,8 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
-    In an MJCF file, the offset of a body is a sum of several vectors: `pos` of the body, `pos` of its joints,
-    and a vector for `ref` of a slide joint. urdfkin adds these vectors once, when it reads the file. MuJoCo
+    In an MJCF file, the offset of a body is the sum of the body's `pos`, the `pos` of its joints, and a
+    vector for the `ref` of a slide joint. urdfkin adds these vectors once, when it reads the file. MuJoCo
     adds them for each configuration. The individual vectors can be longer than their sum. The scale of
     positions is therefore the larger of the length of the path and `lengths`.
 
@@ -454,15 +454,15 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel. The scale includes
     the term w x vel.
 
-    The scale is also valid for the sum of an `AccelerationBreakdown`, which contains the contributions of the
-    joints to an acceleration. Let d_k be the vector from joint k to the frame, and let w_k be the sum of the
-    joint velocities up to joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the
-    length (w_k^2 - w_{k-1}^2) d_k. The sum of these lengths over all joints is the sum of w_k^2 times the
-    length of link k, as in eq. 7.130. A vector d_k is the sum of the vectors between successive joint
-    origins. The rounding errors of d_k are those of the sums in eq. 7.77. The breakdown of an acceleration
-    for n joints has 4 n terms. Adding these terms causes n + 3 rounding errors. The bound contains 2 eps for
-    the sums at each joint. This part of the bound exceeds the rounding errors of d_k and of the sum of 4 n
-    terms.
+    An `AccelerationBreakdown` contains the contributions of the joints to an acceleration. The scale is also
+    valid for the sum of these contributions. Let d_k be the vector from joint k to the frame, and let w_k be
+    the sum of the joint velocities up to joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x
+    d_k) have the length (w_k^2 - w_{k-1}^2) d_k. The sum of these lengths over all joints is the sum of w_k^2
+    times the length of link k, as in eq. 7.130. A vector d_k is the sum of the vectors between successive
+    joint origins. The rounding errors of d_k are those of the sums in eq. 7.77. The breakdown of an
+    acceleration for n joints has 4 n terms. Adding these terms causes n + 3 rounding errors. The bound allows
+    2 eps for the sums at each joint. These 2 eps per joint exceed the rounding errors of d_k and of the sum
+    of 4 n terms.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -588,10 +588,10 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     reciprocal basis vector of the angle's axis. The lengths are |u| = 1 and |r| = 1 / s.
     Here s = |e_i x t| is the sine or cosine of the middle angle.
 
-    Let the error of t be delta = k eps. Then u rotates by delta / s. Let r' be the reciprocal vector of t.
-    Then r changes by the vector -(r . du) u - (r . dt) r'. The length of this vector is at most 2 delta /
-    s^2. For s, the function uses the smallest possible value, `apart` - delta. Let delta also be the relative
-    error of w. Then the errors are:
+    Let the error of t be delta = k eps. This error rotates u by at most delta / s. Let r' be the reciprocal
+    vector of t. Then the change of r is the vector -(r . du) u - (r . dt) r'. This vector is at most 2 delta
+    / s^2 long. For s, the function uses the smallest possible value, `apart` - delta. Let delta also be the
+    relative error of w. Then the errors are:
 
     - first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
@@ -621,10 +621,10 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound (n, frames, 7, nv) of analytical Jacobians with quaternions, which are never singular.
 
     The rows of positions have the same bound as in the velocity Jacobian. Let delta be the error of R. The
-    elements of the matrix 4 q q^T are linear functions of R. The longest row of 4 q q^T has at least the
-    length 2, and its error is below 4.6 delta. Therefore, the error of q is below 2.3 delta. The derivative
-    of q is half the quaternion product of w and q. Its error is (2.3 + 1) / 2 delta |w|. This error is below
-    the bound 2 delta |w| on the angular velocity in the velocity Jacobian.
+    elements of the matrix 4 q q^T are linear functions of R. The longest row of 4 q q^T has a length of at
+    least 2. The error of this row is below 4.6 delta. Therefore, the error of q is below 2.3 delta. The
+    derivative of q is half the quaternion product of w and q. Its error is (2.3 + 1) / 2 delta |w|. This
+    error is below the bound 2 delta |w| on the angular velocity in the velocity Jacobian.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 

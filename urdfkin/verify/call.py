@@ -1,4 +1,4 @@
-"""Convert a call's arguments to flat batches for the recursion, and the results to the caller's shape."""
+"""Convert the arguments of a call to batches with one axis, and the results to the caller's shape."""
 
 from __future__ import annotations
 

@@ -85,8 +85,8 @@ class Comparison:
 
     Attributes:
         results: Number of results (matrices or six-vectors).
-        worst: Largest difference between a number of urdfkin and the same number of the oracle, in multiples
-            of eps * scale.
+        worst: Largest difference between a number in urdfkin's results and the same number in the oracle's
+            results, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
         index: Indices, in the array of results, of the result with the largest ratio `share`.
     """
@@ -215,8 +215,8 @@ class Certificate(Displayable):
         oracle: Name and version of the oracle: "Pinocchio 4.1.0".
         lines: One line for each quantity that was computed.
         not_verified: Reasons why results were not checked; empty if all were checked.
-        reading: If the robot was converted from another format to URDF, the result of the check of this
-            conversion; empty for a URDF.
+        reading: Result of the check of the conversion to URDF, if the robot was read from another format;
+            empty for a URDF.
         source: Source of the robot: a path, a catalogue name or "<text>".
         sha256: SHA-256 digest of the MJCF file, or of the URDF text in UTF-8.
         urdfkin: Version of urdfkin.

@@ -38,7 +38,7 @@ _AHEAD = 4
 def _finite(x, i):
     """Return whether a row is finite.
 
-    If x is not finite, 0 * x is NaN, and a sum with NaN in any order is NaN.
+    If x is not finite, 0 * x is NaN. Every sum that contains NaN is NaN.
     """
     total = 0.0
     for j in range(x.shape[1]):
@@ -48,7 +48,7 @@ def _finite(x, i):
 
 @helper(fastmath={"reassoc"})
 def _finite_difference(x, y, i):
-    """Return whether all differences of two rows are finite; any number that is not finite gives False."""
+    """Return whether all numbers in the difference of two rows are finite."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * (x[i, j] - y[i, j])
@@ -269,7 +269,8 @@ def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
             configurations.
         v: Joint velocities.
         a: Joint accelerations.
-        free: Five lengths for each planar and floating joint (`urdfkin.verify.bounds._free_lengths`).
+        free: Five lengths for each planar and floating joint: of the displacement, the velocities and the
+            accelerations (`urdfkin.verify.bounds._free_lengths`).
         base: State of the base.
         s: Working memory for a block of configurations. It contains the states of the base and of all moving
             joints, and one more state.

@@ -54,8 +54,8 @@ class MjcfReading:
         listed: Elements of the file that the tree does not contain.
         path: The file; None for a text.
         answer: What the separate process returned: data of the robot, its frames, and MuJoCo's results.
-        not_whole: Reason why MuJoCo could compile the file only without shapes and inertias; None if MuJoCo
-            compiled the complete file.
+        not_whole: Reason why MuJoCo rejected the complete file, if MuJoCo compiled the file without shapes
+            and inertias; else None.
         pinocchio: What the separate process returned about Pinocchio's reader; None if nothing.
     """
 
@@ -139,7 +139,7 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
 def _is_answer(line: bytes) -> bool:
     """Return whether a line of the process's output is a complete answer.
 
-    Other lines are text that a library printed, or the first part of an answer of a killed process.
+    Other lines are text that a library printed, or an incomplete answer of a process that was killed.
     """
     return line.startswith(b"{") and line.endswith(b"}\n")
 

@@ -1,4 +1,4 @@
-"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader; this program is a separate process.
+"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader. This module runs in a separate process.
 
 A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory.
 A defect of a parser can crash the process. Therefore, a separate process compiles the file, and the caller's

@@ -37,7 +37,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
 
     Args:
         verifier: Verifier of the robot.
-        made: The tree that was read from the model, with the index in the model for each link.
+        made: The tree that urdfkin made from the model, and the index of each link in the model.
         source: The Pinocchio model, or a RobotWrapper that contains it.
 
     Returns:

@@ -46,8 +46,8 @@ from urdfkin.verify.pinocchio import depth_of
 
 #: Mass (kg) and moments of inertia (kg m^2) that each link has while MuJoCo reads the text.
 _MASS = "1"
-#: Longest chain of links that is accepted.
-#: MuJoCo rejects more than 1,023 links, after a time that grows with the square of their number.
+#: Longest chain of links that is accepted. MuJoCo rejects a robot with more than 1,023 links, but only after
+#: a time that grows with the square of the number of links.
 _DEEPEST = 1_000
 #: MuJoCo's joints for a planar or floating joint, in the order of its coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
@@ -298,7 +298,7 @@ class MujocoOracle(Oracle):
         return J
 
     def _six(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Return [linear; angular] (6,) of the body's origin in world axes; MuJoCo has [angular; linear]."""
+        """Return the velocity or acceleration [linear; angular] (6,) of the body's origin in world axes."""
         six = np.empty(6)
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
         return np.roll(six, 3)

@@ -386,7 +386,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Return R^T times the linear half and R^T times the angular half of a six-vector.
+    """Rotate the linear part and the angular part of a six-vector by R^T.
 
     The rotation is given by a quaternion with the vector part u and the scalar part w. Let y be the linear or
     the angular half, and let c be the cross product of y and u. Then R^T y is y + 2 w c + 2 (c x u).

@@ -9,9 +9,9 @@ parser. `urdfkin.verify.oracle` converts the user's original arguments a second 
 and joints by their names in Pinocchio's model, and it converts the base's motion.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
-robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text a second time.
-The rules define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The
-index "full" marks Pinocchio's vectors, in which mimic joints have numbers of their own.
+robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text a second time. The
+rules define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The name
+"full" marks Pinocchio's vectors, which contain numbers for the mimic joints too.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def version() -> str:
 
 
 def _impostor(found: Any) -> InstallationError:
-    """Return the error for a different project with Pinocchio's name; its message states the remedy."""
+    """Return the error for the case that a different project is installed under Pinocchio's name."""
     file = found.__file__ or next(iter(found.__path__), "a folder without modules")
     owner = _owner(Path(file))
     cure = f"pip uninstall {owner[0]}" if owner else f"rename or remove {file}"
@@ -234,7 +234,7 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Add a free-flyer joint for the base's motion before the model; an existing root joint stays.
+        """Add a free-flyer joint for the base's motion in front of the model. An existing root joint is kept.
 
         Returns:
             The new indices of the joints and of the frames. The frame of the world becomes the frame of the
@@ -362,7 +362,8 @@ class PinocchioOracle(Oracle):
         - Pinocchio returns the numbers in Eigen's order (the first index varies fastest), but in a NumPy
           array with C order (the last index varies fastest).
         - In LOCAL, entries [i, j] with i and j of the same joint are not 0 if another joint precedes this
-          joint. These entries must be 0, because the joint moves its own axes together with the frame.
+          joint. The true value of these entries is 0, because the joint does not move its own axes relative
+          to the frame.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._ids(x), self._reference(x.reference), model.nv

@@ -386,7 +386,7 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def by_command() -> dict[str, Quantity]:
-    """Return the quantities that a command of the command line computes, by the name of the command."""
+    """Return a mapping from the name of each urdfkin command to the quantity that the command computes."""
     return {row.command: row for row in recursive_quantities() if row.command}
 
 

@@ -8,7 +8,7 @@ axes, is stated only if the columns satisfy its condition within the error bound
 
 The column of a revolute joint is [a x z; z]. Here z is the direction of the axis, and the vector a leads from
 the frame's origin to a point of the axis. Therefore, two joint axes are collinear if their columns are equal
-up to sign. An axis passes through the frame's origin if the linear rows of its column are 0.
+up to sign. An axis passes through the frame's origin if the linear part of its Jacobian column is 0.
 """
 
 from __future__ import annotations
@@ -407,7 +407,7 @@ def _sparse(rows: FloatArray) -> FloatArray:
 def _basis(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the vector space that the rows of a matrix span.
 
-    The rows are orthogonal projections of orthonormal vectors.
+    Each row is the orthogonal projection of a unit vector.
     """
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding

@@ -11,8 +11,8 @@ base b and of tip t in the world, and r = p_t - p_b:
 
 These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module implements the
 equations a second time. The check would not be independent if it used `urdfkin.kinematics.equations`, which
-computes the table's results. The bound is the sum of the rounding errors of urdfkin and of Pinocchio, plus
-the deviation that a snapped table declares.
+computes the table's results. The bound is the sum of the rounding errors of urdfkin and of Pinocchio. If the
+table was changed by snapping, the bound also includes the deviation that the table states for snapping.
 
 The bound on rounding errors is proportional to the robot's reach. Here the reach is the length of the paths
 from the root to the table's base and to its tip, with prismatic displacements. If the sum of all lengths in
@@ -62,14 +62,15 @@ class TableError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class TableCheck:
-    """Result of the check of a table; each number is the largest of all samples.
+    """Result of the check of a table. Each number is the largest value over all samples.
 
     Attributes:
         samples: Number of configurations.
         metres: Distance between the table's tip and Pinocchio's tip, m.
         radians: Angle between the orientations of these two tips, rad.
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
-        shares: The same differences divided by their bounds; at most 1 if the table agrees.
+        shares: Ratios of these differences to their bounds. If the table agrees with Pinocchio, no ratio is
+            above 1.
         snapped: True if the table was changed by snapping, for example from an angle of 89.99 to 90 degrees.
             Then the bound includes the deviation that the table states for snapping.
         loss: Explanation of a difference above its bound if very large lengths in the table cause the

@@ -89,7 +89,7 @@ class Verifier:
 
     Attributes:
         ledger: Record of checked and unchecked results.
-        reading: If the text was converted from another format, the result of the check of this conversion.
+        reading: Result of the check of the conversion to URDF, if the robot was read from another format.
             Empty for a URDF.
     """
 

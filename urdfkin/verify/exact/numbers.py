@@ -49,7 +49,7 @@ _ONE_THREAD = lock_over_forks()
 
 
 def enough_digits(joints: int) -> int:
-    """Return a sufficient number of digits, so that intervals are narrower than the last digit of a double.
+    """Return a number of digits for which intervals are narrower than the last digit of a double.
 
     The function adds one digit for each joint on the path to the frame. A joint with an oblique axis makes
     intervals wider by a third of a digit.

@@ -39,7 +39,7 @@ _FREE_AXES = {
 
 
 def on_base(base: BaseNumbers) -> State:
-    """Return the state of a moving root link from the numbers of the base's motion.
+    """Convert the base's motion to the state of the root link in the recursion.
 
     Args:
         base: Placement (4, 4), velocity (6,) and acceleration (6,) of the base. The rotation matrix of the
