@@ -37,8 +37,8 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
         word: The misspelt name.
         known: The existing names.
         cutoff: Least similarity, from 0 to 1.
-        work: Largest number of pairs of characters to compare. When it is reached, `nearest` returns the
-            names found so far.
+        work: Largest number of pairs of characters to compare. When the limit is reached, `nearest` returns
+            the names found so far.
 
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
@@ -117,8 +117,8 @@ class UrdfkinError(Exception):
 
     Attributes:
         what: The problem in one clause, without a full stop.
-        where: The location, for example a file with a line, a frame, or a sample. None if there is no
-            location.
+        where: The location of the problem, for example a line of a file, a frame, or a sample; None if
+            unknown.
         found: The wrong value, as the user wrote it.
         remedy: Instruction for the user.
         question: A related section of docs/questions.md. The message ends with the command that prints this
@@ -257,7 +257,7 @@ class RepresentationSingularityError(InputError):
 
     Attributes:
         sequence: The Euler sequence.
-        distance: Distance of the middle angle from the singularity, radians.
+        distance: Difference between the middle Euler angle and its value at the singularity, radians.
         sample: Index of the worst sample in the batch; () for a single sample.
     """
 

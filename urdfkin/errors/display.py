@@ -1,8 +1,8 @@
 """Display of objects as text, HTML, Markdown and LaTeX.
 
-A class derives from `Displayable` and returns a `TextDocument` from `_sheet`: a title, sentences and tables.
-`Displayable` makes the output of `print` and of notebooks from this document. Names come from files and may
-contain any characters, so each format escapes them.
+A displayed class is a subclass of `Displayable`. Its method `_sheet` returns a `TextDocument`, which consists
+of a title, sentences and tables. `Displayable` makes the output of `print` and of notebooks from this
+document. Names come from files and may contain any characters, so each format escapes them.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ class Table:
     Attributes:
         heads: Titles of the columns.
         rows: Cells of each row. Numbers are displayed with six digits.
-        left: The left-aligned columns. A number n means the first n columns; a list contains the indices of
-            the columns. Leading blanks in these columns are kept.
+        left: The left-aligned columns. If `left` is a number n, the first n columns are left-aligned. If
+            `left` is a list, it contains the indices of the left-aligned columns. Blanks at the start of a
+            left-aligned cell are displayed.
         names: Indices of columns with names. Markdown displays names as code.
     """
 
@@ -50,7 +51,7 @@ class Table:
         ]
 
     def _split_cells(self) -> list[list[tuple[str, str]]]:
-        """Split each cell and heading into its leading box-drawing characters, such as `├─`, and the rest."""
+        """Split each cell and heading into two texts: its leading characters such as `├─`, and the rest."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
             for row in (self.heads, *self.cells())

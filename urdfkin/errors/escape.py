@@ -41,7 +41,7 @@ def printable(text: str) -> str:
 def log_line(text: str) -> str:
     r"""Return one line that is safe for a terminal and for the log of a CI service.
 
-    It is escaped as by `printable`, and commands to the CI service are escaped too.
+    The line is escaped like the result of `printable`. In addition, commands to the CI service are escaped.
 
     Example:
         >>> print(log_line("::error::a\n##vso[b]"))
@@ -119,7 +119,7 @@ def json_text(data: Any) -> str:
 
 
 def escape(c: str) -> str:
-    """Return the escape of a character in Python and TOML. Up to U+FFFF it is also valid in JSON."""
+    """Return the escape sequence of a character in Python and TOML. Up to U+FFFF, JSON accepts it too."""
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
 

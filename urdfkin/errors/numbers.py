@@ -60,7 +60,7 @@ def remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: For each accepted name of a unit: the short name.
+#: The accepted names of units, each with the unit's short name.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),
@@ -80,7 +80,7 @@ class Measured(NamedTuple):
     """A parsed number with its unit.
 
     Attributes:
-        value: The number, in radians or metres if a unit is given, otherwise as written.
+        value: The number. If the text contains a unit, the number is converted to radians or metres.
         unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
         per: Exponent of the seconds in the denominator of the unit: 0 for a position, 1 for a velocity such
             as rad/s, 2 for an acceleration such as rad/s^2.

@@ -26,7 +26,7 @@ def whole_number(value: object, name: str, least: int, most: float = math.inf) -
     else:
         try:
             number = value.__index__()  # type: ignore[attr-defined]
-        except TypeError:  # an array has this method but is not a number
+        except TypeError:  # a NumPy array has `__index__` too, but raises TypeError
             raise InputError(
                 f"{name} must be a whole number, at least {least}", found=safe_repr(value)
             ) from None

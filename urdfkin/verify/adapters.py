@@ -57,7 +57,7 @@ class Reading:
     poses: Callable[[Mapping[str, Value]], Poses]
 
     def unset(self, values: Mapping[str, Value]) -> list[str]:
-        """Return the names in `values` of joints that have no coordinate in the library."""
+        """Return the joints in `values` that the library does not move."""
         return [name for name in values if name not in self.joints]
 
 
@@ -103,7 +103,7 @@ def _rigid(R: Any, p: Any) -> Any:
 
 
 def _relative(poses: Poses, root: str) -> Poses:
-    """Return link poses relative to the root link; a root merged into the world is at the world's origin."""
+    """Return link poses relative to the root link. A missing root link has the identity pose."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
@@ -182,7 +182,7 @@ def read_mujoco(text: str) -> Reading:
 
 
 def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
-    """Yield the MuJoCo joints that replace a joint of the URDF, with the values of these MuJoCo joints.
+    """Yield the name and the value of each MuJoCo joint that replaces a joint of the URDF.
 
     A planar joint becomes two slide joints and a hinge joint.
     """
@@ -242,7 +242,7 @@ def read_idyntree(text: str) -> Reading:
 
     def poses(
         values: Mapping[str, Value], _owner: Any = loader
-    ) -> Poses:  # the model exists only as long as its loader
+    ) -> Poses:  # `_owner` keeps the loader alive, and the model with it
         q = np.zeros(model.getNrOfPosCoords())
         for name in places.keys() & values.keys():
             q[places[name]] = _scalar(values[name])
@@ -339,7 +339,7 @@ def read_ikpy(text: str) -> Reading:
 
 
 def read_roboticstoolbox(text: str) -> Reading:
-    """Read with the Robotics Toolbox for Python."""
+    """Read a URDF with the Robotics Toolbox for Python."""
     import roboticstoolbox as rtb  # noqa: PLC0415
 
     joints = {child: joint for joint, child in _children(text).items()}
@@ -456,7 +456,7 @@ def version(name: str) -> str | None:
 
 
 def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a library's joints and poses for a case, or the error that it raises."""
+    """Return the joints and poses that a library finds for a case, or the text of its error."""
     try:
         reading = LIBRARIES[name].read(case["text"])
         found = [reading.poses(values) for values in case["configurations"]]

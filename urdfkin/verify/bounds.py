@@ -4,9 +4,9 @@ A result is accepted if each of its numbers differs from the oracle's number by 
 
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
-Each number is a sum of terms. *scale* is an upper bound on the sum of the absolute values of these terms, in
-the number's unit (`magnitudes`). If two computations add the same terms in different orders, their difference
-is proportional to this scale, not to the sum.
+Each number is a sum of terms. *scale* is an upper bound on the sum of the absolute values of these terms
+(`magnitudes`). The scale has the unit of the number. If two computations add the same terms in different
+orders, the difference of the two results is proportional to the scale, not to the sum of the terms.
 
 *k* is the number of roundings to first order in eps (`urdfkin.kinematics.roundings`). Each joint on the path
 adds a fixed number of roundings. Each joint also rotates the vectors of the joints after it. A rotation does
@@ -28,14 +28,15 @@ The references LOCAL and WORLD need one more factor: a rotation into the frame's
 product with p (WORLD).
 
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
-worst way. Reports state these differences in multiples of eps * scale, which can be compared between robots.
+worst way. Reports state differences in multiples of eps * scale, because these multiples can be compared
+between robots.
 
-`magnitudes` runs the forward recursion with the length of each vector in place of the vector. The function
+`magnitudes` runs the forward recursion with the lengths of vectors instead of the vectors. The function
 evaluates eq. 7.58 and 7.127 to 7.130 with the number types of `urdfkin.kinematics.number_kinds`. With these
-number types, no intermediate value exceeds the result. One term is different in Pinocchio. Eq. 7.129 has v_i
-w_{i-1} x z; Pinocchio has v_i w_i x z. The difference is v_i^2 z x z, which is 0 except for rounding. This
-rounding is relevant for fast joints with an oblique axis. `magnitudes` therefore computes its bound on alpha
-with w_i instead of w_{i-1}.
+number types, no intermediate value exceeds the result. Pinocchio computes one term differently. Eq. 7.129
+contains the term v_i w_{i-1} x z. Pinocchio computes v_i w_i x z instead. The difference is v_i^2 z x z,
+which is 0 except for rounding errors. These rounding errors are relevant for fast joints with an oblique
+axis. `magnitudes` therefore uses w_i instead of w_{i-1} in its bound on the angular acceleration alpha.
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ from urdfkin.verify.comparison import KERNELS
 _UNTURNED = np.eye(3).ravel()
 #: Indices of the position, the velocities and the accelerations in the state of a moving base.
 _OF_BASE = 9, 12, 15, 18, 21
-#: Number of configurations that the compiled kernel `lengths` computes at a time.
-#: The intermediate results for these configurations fit into the processor's first-level cache.
+#: Number of configurations in a block. The compiled function `lengths` computes one block at a time. The
+#: intermediate results for these configurations fit into the processor's first-level cache.
 _BLOCK = 64
 
 
@@ -73,13 +74,14 @@ class Magnitudes:
     """Upper bounds on the terms of a frame's position, velocity and acceleration.
 
     Attributes:
-        p: (n, frames) length of the path from the world origin, prismatic displacements included, m.
+        p: (n, frames) length of the path from the world origin, in m. Prismatic displacements are included.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) upper bound on the number of rounding errors of one factor. The bound is for
-            all URDF joints on the path, for a rotated base, and for one additional joint.
+        roundings: (n, frames) upper bound on the number of rounding errors of one factor. A factor is a
+            rotated vector. The bound counts all URDF joints on the path, a rotated base, and one additional
+            joint.
     """
 
     p: FloatArray
@@ -123,7 +125,7 @@ def magnitudes(
 
 
 def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Compute `out` with NumPy; for one configuration, compute it with Python numbers."""
+    """Compute `out` with NumPy, or with Python numbers for a single configuration."""
     q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
     states = [tuple(_norm(base[at : at + 3]) for at in _OF_BASE)]
     for link in lengths.links:
@@ -131,13 +133,13 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
     for end in lengths.ends:
         carried = (steps.carried if rates else _carried_place)(states[end.step + 1], end.length)
         for row, values in zip(out, carried, strict=False):
-            row[:, end.place] = values  # a value equal for all configurations is a scalar
+            row[:, end.place] = values  # `values` is a scalar if it is equal for all configurations
 
 
 def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Compute `out` with a compiled kernel. The results are exactly those of `_by_steps`."""
+    """Compute `out` with a compiled function. The results are equal to the results of `_by_steps`."""
     links = lengths.links
-    # An input that is the same for all configurations has one row.
+    # If an input is the same for all configurations, the kernel receives only one row of it.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -156,7 +158,7 @@ def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out
 
 
 def _rows(columns: Sequence[FloatArray]) -> FloatArray:
-    """Return an array with the given columns; a column with a single number is repeated."""
+    """Return an array with the given columns. A column of length 1 is repeated in every row."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
         row[:] = column
@@ -166,7 +168,7 @@ def _rows(columns: Sequence[FloatArray]) -> FloatArray:
 class _Link(NamedTuple):
     """A moving joint of a compiled tree.
 
-    `multiplier` and `constant` are the absolute values of its mimic rule's numbers.
+    `multiplier` and `constant` are the absolute values of the joint's mimic multiplier and mimic offset.
     """
 
     kind: int
@@ -181,8 +183,8 @@ class _Link(NamedTuple):
 class _End(NamedTuple):
     """A frame of a compiled tree.
 
-    `length` is the length of the path from the last moving joint `step` to the frame, and `place` is the
-    frame's index in the output.
+    `step` is the index of the last moving joint before the frame. `length` is the length of the path from
+    this joint to the frame. `place` is the frame's index in the output.
     """
 
     step: int
@@ -191,7 +193,7 @@ class _End(NamedTuple):
 
 
 class _Lengths(NamedTuple):
-    """The steps and frames of a compiled tree, as Python numbers and as arrays for the kernel."""
+    """The moving joints and the frames of a compiled tree, as Python numbers and as NumPy arrays."""
 
     links: list[_Link]
     ends: list[_End]
@@ -199,7 +201,7 @@ class _Lengths(NamedTuple):
 
 
 def _lengths(plan: CompiledTree) -> _Lengths:
-    """Return the steps and frames of a compiled tree; the result is stored for later calls."""
+    """Return the moving joints and the frames of a compiled tree. The result is stored for later calls."""
     found: _Lengths | None = plan.made.get("lengths")
     if found is None:
         lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
@@ -222,7 +224,7 @@ def _lengths(plan: CompiledTree) -> _Lengths:
 
 
 def _columns(x: FloatArray, n: int) -> Any:
-    """Return the columns of an array (n or 1, ...); for one configuration, return Python numbers."""
+    """Return the columns of an array (n or 1, ...), or Python numbers for one configuration."""
     return x[0].tolist() if n == len(x) == 1 else x.T
 
 
@@ -235,7 +237,7 @@ def _carried_place(state: State, d: Length) -> State:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: For a planar or floating joint: the number of translations, and the number of rotations.
+#: Numbers of translations and of rotations of a planar joint and of a floating joint.
 _FREE_PARTS = {int(Motion.PLANAR): (2, 1), int(Motion.FLOATING): (3, 3)}
 
 
@@ -273,17 +275,17 @@ def _step(link: _Link, state: State, q: Any, v: Any, a: Any) -> State:
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale above the range of doubles is inf; `disagreement` then accepts no result.
+#: A scale above the range of doubles is inf. If the scale is inf, `disagreement` accepts no result.
 _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The bound k * eps * scale of a quantity. The arrays `k` and `scale` broadcast against the results.
+    """The bound k * eps * scale of a quantity. NumPy broadcasting applies to `k`, `scale` and the results.
 
     Attributes:
-        scale: Upper bound on the sum of the absolute values of a number's terms, in the number's unit. The
-            scale is 0 if the numbers must be equal.
+        scale: Upper bound on the sum of the absolute values of the terms of a number, in the unit of this
+            number. A scale of 0 means that the results of urdfkin and of the oracle must be equal.
         k: Allowed difference in multiples of eps * scale.
     """
 
@@ -292,10 +294,10 @@ class Bound:
 
 
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the `k` of each result, as an array of shape `leading`.
+    """Return the factor `k` of the bound for each result, as an array of shape `leading`.
 
-    All numbers of a result have the same `k`. A k that is not finite and positive becomes NaN, so that no
-    result is within its bound.
+    All numbers of a result have the same `k`. A value of k that is not finite and positive is replaced by
+    NaN. Then no result is within its bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -305,7 +307,7 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
     """Return the bound of a quantity with the given scale (n, frames, ...).
 
-    The `k` of the bound is the number of factors times the number of roundings of one factor.
+    The factor `k` of the bound is the number of factors times the number of rounding errors of one factor.
     """
     factors += reference is not _ALIGNED
     k = factors * size.roundings
@@ -319,9 +321,9 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass. In the models of
     `urdfkin.verify.mujoco`, this centre of mass is at the root. At the end, MuJoCo converts the results to
     the frame's origin. The distance of the centre of mass from a joint or from the frame is at most the
-    length of the path. Therefore, lever arms are at most 2 p. Both conversions, to the centre of mass and to
-    the frame, use a cross product with a lever arm. With these cross products, the number of factors is at
-    most twice as large. The bound allows `MUJOCO` roundings for each joint instead of `ROUNDINGS`.
+    length of the path. Therefore, lever arms are at most 2 p. MuJoCo converts a vector to the centre of mass
+    and back to the frame by a cross product with a lever arm. These cross products at most double the number
+    of factors. The bound allows `MUJOCO` rounding errors for each joint instead of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -339,11 +341,11 @@ class Conversion(NamedTuple):
     """The errors of converting a URDF's decimals to doubles (`urdfkin.verify.exact.numbers.conversion`).
 
     Attributes:
-        angles: (n,) sum of the errors of angles over the joints of the path, in eps rad.
+        angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
         rules: Number of mimic rules for the joints on the path. For a joint that mimics a mimic joint, both
             rules are counted.
-        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. They are positive if offsets of
-            mimic rules cancel.
+        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if the offsets
+            of a chain of mimic rules cancel each other.
     """
 
     angles: FloatArray
@@ -356,12 +358,12 @@ def against_true_values(
 ) -> Magnitudes:
     """Return the magnitudes for a comparison of one program's results with the true values.
 
-    The true values are computed from the decimals in the URDF and from the doubles q, v and a. They are
-    rounded to 17 digits. `ROUNDINGS` = 24 roundings are allowed for each joint, and one program has at most
-    16.8 roundings (`urdfkin.kinematics.roundings`). The other 7.2 roundings are enough for the conversions of
-    decimals to doubles. The offset, the axis and the true value each have a conversion error of half an eps.
-    An axis is used in two rotations, so its error is added twice. Two kinds of numbers need additional
-    roundings:
+    The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
+    values are rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One
+    program makes at most 16.8 of these rounding errors (`urdfkin.kinematics.roundings`). The remaining 7.2
+    are enough for the conversions of decimals to doubles. The offset, the axis and the true value each have a
+    conversion error of half an eps. An axis is used in two rotations, so its error is added twice. Two kinds
+    of numbers need additional roundings:
 
     - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint turn by
       at most (|roll| + |pitch| + |yaw|) / 2 eps.
@@ -370,20 +372,20 @@ def against_true_values(
       is multiplied by |m|.
 
     A mimic joint may mimic another mimic joint, so r rules can form a chain. A program may combine the rules
-    of a chain to one rule M q + C. The combined rule has the same roundings as the separate rules, except for
-    its sums: r - 1 sums in C, and the sum of M q and C. Let X be the value that results if all terms are
-    replaced by their absolute values. For an independent joint, X is |q|. For a mimic joint, X is |m| X' +
-    |c|, where X' is the X of the mimicked joint. No sum exceeds X. The error of the combined rule's value is
-    therefore at most (r - 1) / 2 X eps larger.
+    of a chain to one rule M q + C. The combined rule has the same rounding errors as the separate rules,
+    except for the sums. The combined rule has r - 1 sums in C, and the sum of M q and C. Let X be the value
+    of the joint if all terms are replaced by their absolute values. For an independent joint, X is |q|. For a
+    mimic joint, X is |m| X' + |c|, where X' is the X of the mimicked joint. No sum exceeds X. The combined
+    rule can therefore increase the error by at most (r - 1) / 2 X eps.
 
-    The error of a revolute mimic joint's value rotates all later vectors of the path. An error of 1 eps rad
-    changes each factor by at most 1 eps of its length.
+    The error of a revolute mimic joint's value rotates all later vectors of the path. An angle error of 1 eps
+    rad changes a vector by at most eps times the length of the vector.
 
-    The displacement of a prismatic mimic joint has an error of at most 3/2 r X eps, because no term of X has
-    more than 3 r roundings. This is true for separate rules and for a combined rule. If the offsets of a
-    chain cancel, |M q| + |C| is far below X. Therefore, X is the length of such a joint's displacement in the
-    computation of the magnitudes. Then 3/2 eps for each rule are enough. They are enough for the joint's
-    velocity and acceleration too, which have fewer roundings.
+    Each term of X is rounded at most 3 r times, so the displacement of a prismatic mimic joint has an error
+    of at most 3/2 r X eps. This bound is valid for separate rules and for a combined rule. If the offsets of
+    a chain cancel each other, |M q| + |C| is far below X. Therefore, the function uses X as the length of
+    such a joint's displacement. Then a rounding error of 3/2 eps for each rule is enough. The same error is
+    enough for the joint's velocity and acceleration, which are rounded less often.
 
     Args:
         plan: The compiled tree of one frame.
@@ -398,7 +400,11 @@ def against_true_values(
 
 
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
-    """Return the scale (n, frames, 4, 4): path length for positions, 1 for rotations, 0 for the last row."""
+    """Return the scale (n, frames, 4, 4) of the bound on placements.
+
+    For positions, the scale is the length of the path. For rotations, the scale is 1. For the last row, the
+    scale is 0.
+    """
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
     scale[..., :3, 3] = size.p[..., None]
@@ -409,20 +415,21 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
-    In an MJCF file, the offset of a body is a sum of several vectors: `pos` of the body, `pos` of its joints,
-    and a vector for `ref` of a slide joint. The tree contains this sum as a constant. MuJoCo computes the sum
-    for each configuration. The vectors can be longer than their sum. The scale of positions is therefore the
-    length of the path or `lengths`, whichever is larger.
+    In an MJCF file, the offset of a body is the sum of the body's `pos`, the `pos` of its joints, and a
+    vector for the `ref` of a slide joint. urdfkin adds these vectors once, when it reads the file. MuJoCo
+    adds them for each configuration. The individual vectors can be longer than their sum. The scale of
+    positions is therefore the larger of the length of the path and `lengths`.
 
-    MuJoCo rotates a hinge by the rounded difference fl(q - ref); the tree rotates it by ref and by q. The
-    rounding error of the difference is at most (eps/2) (|q| + |ref|) rad. All bodies after the hinge are
-    rotated by this angle. An entry of a rotation matrix changes by at most this angle. A coordinate of a
-    position changes by at most this angle times the length. The bound allows twice these changes, which
-    covers terms of second order. The scale is therefore multiplied by 1 + `angles` / k.
+    MuJoCo rotates a hinge by the angle q - ref, which is a rounded number. urdfkin's tree rotates the hinge
+    by ref and by q separately. The rounding error of the difference is at most (eps/2) (|q| + |ref|) rad. All
+    bodies after the hinge are rotated by this angle error. An entry of a rotation matrix changes by at most
+    the angle error. A coordinate of a position changes by at most the angle error times the length of the
+    path. The bound allows twice these changes, so that it also covers terms of second order. The scale is
+    therefore multiplied by 1 + `angles` / k.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
-        lengths: (n, frames) sum of the lengths of all these vectors on the path to the frame, m.
+        lengths: (n, frames) sum of the lengths of the vectors `pos` and `ref` on the path to the frame, m.
         angles: (n, frames) sum of |q| + |ref| over the hinges with a reference value, rad.
     """
     scale = bound.scale.copy()
@@ -444,17 +451,18 @@ def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on accelerations [linear; angular], (n, frames, 6).
 
-    Pinocchio computes classical accelerations from spatial accelerations. The difference is the term w x vel,
-    which the scale includes.
+    Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel. The scale includes
+    the term w x vel.
 
-    The scale is also valid for the sum of an `AccelerationBreakdown`, which contains the contributions of the
-    joints to an acceleration. Let d_k be the vector from joint k to the frame, and let w_k be the sum of the
-    joint velocities up to joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have the
-    length (w_k^2 - w_{k-1}^2) d_k. Over all joints, these lengths add up to the sum of w_k^2 times the length
-    of link k, as in eq. 7.130. The vectors d_k are sums of the vectors between joint origins and have the
-    rounding errors of the sums in eq. 7.77. A breakdown for n joints has 4 n terms, and their sum is computed
-    with n + 3 roundings. The bound contains 2 eps for the sums at each joint. The roundings of d_k and of the
-    sum of 4 n terms are below this part of the bound.
+    An `AccelerationBreakdown` contains the contributions of the joints to an acceleration. The scale is also
+    valid for the sum of these contributions. Let d_k be the vector from joint k to the frame, and let w_k be
+    the sum of the joint velocities up to joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x
+    d_k) have the length (w_k^2 - w_{k-1}^2) d_k. The sum of these lengths over all joints is the sum of w_k^2
+    times the length of link k, as in eq. 7.130. A vector d_k is the sum of the vectors between successive
+    joint origins. The rounding errors of d_k are those of the sums in eq. 7.77. The breakdown of an
+    acceleration for n joints has 4 n terms. Adding these terms causes n + 3 rounding errors. The bound allows
+    2 eps for the sums at each joint. These 2 eps per joint exceed the rounding errors of d_k and of the sum
+    of 4 n terms.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -473,7 +481,6 @@ def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
 
 
 def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """Return (..., 6): each number of `linear` three times, then each number of `angular` three times."""
     scale = np.empty((*linear.shape, 6))
     scale[..., :3] = linear[..., None]
     scale[..., 3:] = angular[..., None]
@@ -481,7 +488,6 @@ def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
 
 
 def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """Return (..., 6, nv): the row of `linear` three times, then the row of `angular` three times."""
     scale = np.empty((*linear.shape[:-1], 6, linear.shape[-1]))
     scale[..., :3, :] = linear[..., None, :]
     scale[..., 3:, :] = angular[..., None, :]
@@ -504,9 +510,9 @@ def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
 def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
-    The column of a revolute joint is at most as long as the path to the frame. The vector d of the column z x
-    d changes at most as fast as the frame's origin moves. In LOCAL, J-dot contains components along the
-    frame's axes, which rotate.
+    The length of a revolute joint's column is at most the length of the path to the frame. The linear rows of
+    this column are z x d. The derivative of d is at most as long as the bound on the velocity of the frame's
+    origin. In LOCAL, J-dot is the derivative of components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -519,10 +525,11 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     return _six_rows(linear, angular)
 
 
-#: Numbers of products that Pinocchio adds for the derivative of the linear part of column i with respect to
-#: joint j. Use the first pair if joint j is joint i or is nearer to the root, else the second pair. For two
-#: revolute joints, use the pair's first number: it counts the products z x (z x d). For a revolute and a
-#: prismatic joint, use the pair's second number: it counts the products z x z.
+#: Pinocchio computes the derivative of the linear part of Jacobian column i with respect to joint j as a sum
+#: of products. This table contains the number of products. The first pair is for a joint j that is joint i or
+#: is nearer to the root than joint i. The second pair is for all other joints j. The first number of a pair
+#: counts the products z x (z x d) of two revolute joints. The second number counts the products z x z of a
+#: revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -534,18 +541,19 @@ _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = 
 def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
-    The scale is a sum over pairs of Jacobian columns. The column of a mimic joint is added to the column of
-    the mimicked joint. A lever arm d is never longer than the path. Pinocchio computes each entry from two
-    Jacobian columns c = [z x d; z] at the world origin. Pinocchio adds these products:
+    An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
+    column of the mimicked joint, so the scale of an entry can be a sum over several pairs. A lever arm d is
+    never longer than the path. Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the
+    world origin. Pinocchio adds these products:
 
     - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
     - one more to move the result to the frame's origin p, p x (w_1 x w_2)
     - two more to move the other column there, (v - p x w) x w
 
-    These counts give the numbers five, two and three in `_PAIR_TERMS`. urdfkin needs the single product z x
-    (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first rotates the two columns by R. urdfkin
-    then computes two products of five factors: R, z, R, z and d. The bound is larger than these products
-    need: it allows three products of four factors.
+    The numbers five, two and three in `_PAIR_TERMS` are sums of these counts. urdfkin needs the single
+    product z x (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first rotates the two columns by
+    R. Then urdfkin computes two products. Each product has the five factors R, z, R, z and d. The bound
+    allows three products of four factors, which is more than these two products need.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -573,16 +581,17 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
 def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
-    The rows of positions have the same bound as in the velocity Jacobian. The axes of the first, middle and
-    last angle are e_i, u and t = R e_k (`analytical_reference`). Let w be the angular part of a column of the
-    velocity Jacobian. The column's element for the middle angle is u . w. The elements for the first and last
-    angle are r . w, where r is a vector of the reciprocal basis of the axes. Here |u| = 1 and |r| = 1 / s,
-    where s = |e_i x t| is the sine or cosine of the middle angle.
+    The rows of positions have the same bound as in the velocity Jacobian. The rotation axis of the first
+    angle is e_i, that of the middle angle is u, and that of the last angle is t = R e_k
+    (`analytical_reference`). Let w be the angular part of a column of the velocity Jacobian. The column's
+    element for the middle angle is u . w. The element for the first or last angle is r . w. Here r is the
+    reciprocal basis vector of the angle's axis. The lengths are |u| = 1 and |r| = 1 / s.
+    Here s = |e_i x t| is the sine or cosine of the middle angle.
 
-    Let the error of t be delta = k eps. Then u rotates by delta / s. Let r' be the reciprocal vector of t.
-    Then r changes by the vector -(r . du) u - (r . dt) r'. The length of this vector is at most 2 delta /
-    s^2. Here s is the smallest possible value, `apart` - delta. Let the relative error of w be delta too.
-    Then the errors are:
+    Let the error of t be delta = k eps. This error rotates u by at most delta / s. Let r' be the reciprocal
+    vector of t. Then the change of r is the vector -(r . du) u - (r . dt) r'. This vector is at most 2 delta
+    / s^2 long. For s, the function uses the smallest possible value, `apart` - delta. Let delta also be the
+    relative error of w. Then the errors are:
 
     - first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
@@ -590,8 +599,9 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale of the
     velocity Jacobian is therefore multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the
     middle angle. In urdfkin and in the reference, arctan2 and the sine of the angle add rounding errors of
-    about 3 eps. Products and quotients add about 10 eps. `Magnitudes.roundings` contains the roundings of one
-    additional joint, which are more than these errors.
+    about 3 eps. Products and quotients add about 10 eps. These errors need no additional bound, because
+    `Magnitudes.roundings` counts one joint more than the path contains, and a joint has more rounding errors
+    than these.
 
     Args:
         bound: Bound of the Jacobian.
@@ -599,7 +609,7 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
         apart: (n, frames) s of Pinocchio's rotation.
     """
     s = apart - EPS * size.roundings
-    s = np.where(s > 0.0, s, 0.0)  # accept no result if s is below its rounding error
+    s = np.where(s > 0.0, s, 0.0)  # if s is below its rounding error, accept no result
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
         scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
@@ -611,10 +621,10 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound (n, frames, 7, nv) of analytical Jacobians with quaternions, which are never singular.
 
     The rows of positions have the same bound as in the velocity Jacobian. Let delta be the error of R. The
-    elements of the matrix 4 q q^T are linear functions of R. The longest row of 4 q q^T has at least the
-    length 2, and its error is below 4.6 delta. Therefore, the error of q is below 2.3 delta. The derivative
-    of q is half the quaternion product of w and q. Its error is (2.3 + 1) / 2 delta |w|. This error is below
-    the bound 2 delta |w| on the angular velocity in the velocity Jacobian.
+    elements of the matrix 4 q q^T are linear functions of R. The longest row of 4 q q^T has a length of at
+    least 2. The error of this row is below 4.6 delta. Therefore, the error of q is below 2.3 delta. The
+    derivative of q is half the quaternion product of w and q. Its error is (2.3 + 1) / 2 delta |w|. This
+    error is below the bound 2 delta |w| on the angular velocity in the velocity Jacobian.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
@@ -622,13 +632,13 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the limit of |qw| below which rounding can change the sign of qw.
 
-    The limit is 1.5 k eps = 3 delta. It is above 2.3 delta, the error of q.
+    The limit is 1.5 k eps = 3 delta. The error of the quaternion q is only 2.3 delta.
     """
     return 1.5 * EPS * result_k(bound, leading)
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return the smallest distance (rad) from a singularity for which results still have a valid digit.
+    """Return the distance (rad) from a singularity below which results have no valid digit.
 
     The distance is four times the error of R.
     """
@@ -636,7 +646,10 @@ def nearest_singularity(plan: CompiledTree) -> float:
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Return, for each frame and column, the sums of |multiplier| over revolute and over prismatic joints."""
+    """Return the sums of |multiplier| over revolute joints and over prismatic joints.
+
+    Each sum is an array (frames, nv). An independent joint has the multiplier 1.
+    """
     weights: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
     if weights is None:
         weights = plan.made["column weights"] = _column_weights(plan)
@@ -654,18 +667,18 @@ def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 
 
 def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
-    """Return (frames, 6, nv): False for the entries of a Jacobian that are always 0, else True.
+    """Return a bool array (frames, 6, nv).
 
-    An entry is always 0 if it is 0 for every q and every motion of the base. The linear rows of a revolute
-    column are z x d. The vector d is 0 for every q if the path has no length and no prismatic joint. In
-    WORLD, this path leads from the root to the joint. In the other reference frames, it leads from the joint
-    to the frame.
+    The array is False for the entries of a Jacobian that are 0 for every q and every motion of the base. The
+    linear rows of a revolute column are z x d. In WORLD, d is the vector from the root to the joint. In the
+    other reference frames, d is the vector from the joint to the frame. The vector d is 0 for every q if the
+    path between these points has no length and no prismatic joint.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]
     extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
     for f, (end, place) in enumerate(plan.frames):
-        path, step = list[int](), int(end)  # the steps from the frame to the root
+        path, step = list[int](), int(end)  # the joints from the frame to the root
         while step >= 0:
             path.append(step)
             step = int(plan.parents[step])
@@ -683,9 +696,10 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
 
 
 def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
-    """Return |ours - theirs| in multiples of eps * scale; inf if the two differ and the scale is 0.
+    """Return |ours - theirs| in multiples of eps * scale.
 
-    The result is also inf if `ours`, `theirs` or the scale is not finite.
+    The result is inf if the scale is 0 and the results differ. The result is also inf if `ours`, `theirs` or
+    the scale is not finite.
     """
     unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, LEAST_UNIT), 0.0)
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""Convert a call's arguments to flat batches for the recursion, and the results to the caller's shape."""
+"""Convert the arguments of a call to batches with one axis, and the results to the caller's shape."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _PLAIN = np.ndarray, np.memmap
 
 
 class Part(NamedTuple):
-    """A part of a call's configurations, as inputs of urdfkin's recursion and as inputs of the oracle.
+    """Some of the configurations of a call, converted for urdfkin and, independently, for the oracle.
 
     Attributes:
         plan: The compiled tree.
         reference: Reference frame; placements ignore it.
         q: (n, nq).
-        rates: Arrays (n, nv): empty for a placement, (v,) for a velocity, (v, a) for an acceleration, for
-            example.
+        rates: The arrays v and a (n, nv) that the quantity needs: () for a placement, (v,) for a velocity,
+            and (v, a) for an acceleration.
         state: (n or 1, 24) state of the moving base.
         query: The same configurations for the oracle, converted independently from the user's arguments.
         options: Other arguments of the method, by name.
@@ -58,7 +58,7 @@ class Call:
         frame: Name of a link or joint, or several names.
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
-        given: Those of the inputs q, v and a that the quantity needs.
+        given: The inputs of the quantity: q, or q and v, or q, v and a.
         also: Additional frames; they are computed after the frames in `frame` and are not returned.
         options: Other arguments of the method, by name.
 
@@ -122,11 +122,11 @@ class Call:
 
     @property
     def results(self) -> int:
-        """Number of results that the call returns."""
+        """Number of results of the call: the number of configurations times the number of frames."""
         return self.n * len(self.links)
 
     def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
-        """Return the caller's array `out` in the shape (n, frames, ...) that the kernels need.
+        """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
         Subclasses of NumPy's array are rejected. For example, `reshape` of a NumPy matrix returns a different
         shape than requested. A kernel would then write past the end of the array.
@@ -146,20 +146,20 @@ class Call:
                 if isinstance(out, np.ndarray) and type(out) not in _PLAIN
                 else None,
             )
-        self.question.read()  # an input list may contain views of `out`
+        self.question.read()  # read the inputs now, because they may be views of `out`
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a, because the check reads them again")
         return out.reshape(self.n, len(self.links), *own)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """Return a result (n, frames, ...) in the caller's batch shape.
+        """Reshape a result (n, frames, ...) to the batch shape of the caller's q.
 
         The result for a single frame has no axis for frames.
         """
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `evaluate`; if an input is not finite, raise an error that names the number."""
+        """Call `evaluate`. If an input is not finite, raise an error with the name of its joint."""
         try:
             return evaluate(*arguments, **options)
         except NotFiniteError:
@@ -175,7 +175,7 @@ class Call:
         return Part(self.plan, self.reference, self.q[part], rates, state, query, self.options)
 
     def index(self, k: int) -> tuple[int, ...]:
-        """Return the index in the caller's batch of sample k of the flat batch."""
+        """Convert the index k in the flat batch to indices in the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
 
@@ -193,7 +193,7 @@ def _described(out: object) -> str:
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return whether `frame` is a list of names, and the names; a later lookup reports unknown names."""
+    """Return whether `frame` is a list, and return its names. Unknown names are reported later."""
     if isinstance(frame, str):
         return False, (frame,)
     try:

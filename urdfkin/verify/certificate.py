@@ -85,10 +85,10 @@ class Comparison:
 
     Attributes:
         results: Number of results (matrices or six-vectors).
-        worst: Largest difference between a number of urdfkin and the same number of the oracle, in multiples
-            of eps * scale.
+        worst: Largest difference between a number in urdfkin's results and the same number in the oracle's
+            results, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
-        index: Index of the result with the largest ratio, in the array of results.
+        index: Indices, in the array of results, of the result with the largest ratio `share`.
     """
 
     results: int
@@ -102,10 +102,10 @@ class Comparison:
         return cls(0, 0.0, 0.0, ())
 
     def __add__(self, other: Comparison) -> Comparison:
-        """Return the combined comparison of two batches.
+        """Combine the comparisons of two batches into one comparison.
 
-        The `index` of the result belongs to the batch with the larger ratio. A ratio that is not a number
-        counts as larger than any number.
+        The `index` is the index from the batch with the larger ratio `share`. A ratio of NaN counts as larger
+        than any number.
         """
         second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
         first, second = (other, self) if second_is_larger else (self, other)
@@ -129,16 +129,16 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
         ours: urdfkin's results. The remaining axes after the first `axes` are those of one result. For
             placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
         theirs: The oracle's results, of the same shape.
-        bound: Bound on the difference. The arrays `scale` and `k` of the bound broadcast against the results.
+        bound: Bound on the difference between `ours` and `theirs`.
         axes: Number of leading axes that are not axes of one result.
     """
     return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
 
 
 def comparison_of(units: FloatArray, bound: Bound) -> Comparison:
-    """Return the comparison of results whose largest differences are given.
+    """Compare the largest difference of each result with the result's bound.
 
-    The differences `units`, one for each result, are in multiples of eps * scale.
+    The array `units` contains one difference for each result, in multiples of eps * scale.
     """
     if not units.size:
         return Comparison.of_nothing()
@@ -157,7 +157,7 @@ class Line:
         worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
             scale.
         share: Largest ratio of a difference to its bound.
-        unchecked: Number of results that were returned without a check.
+        unchecked: Number of results that were not checked.
     """
 
     quantity: str
@@ -168,7 +168,7 @@ class Line:
 
 
 class LineEntry(TypedDict):
-    """The line of a saved certificate about one quantity, as plain data."""
+    """The line about one quantity in the JSON file of a certificate."""
 
     quantity: Annotated[str, says("Name of the quantity.")]
     checked: Annotated[Count, says("Number of results that the oracle confirmed.")]
@@ -215,10 +215,10 @@ class Certificate(Displayable):
         oracle: Name and version of the oracle: "Pinocchio 4.1.0".
         lines: One line for each quantity that was computed.
         not_verified: Reasons why results were not checked; empty if all were checked.
-        reading: If the robot was converted from another format to URDF, the result of the check of this
-            conversion; empty for a URDF.
+        reading: Result of the check of the conversion to URDF, if the robot was read from another format;
+            empty for a URDF.
         source: Source of the robot: a path, a catalogue name or "<text>".
-        sha256: Digest of the URDF text as UTF-8, or of the MJCF file.
+        sha256: SHA-256 digest of the MJCF file, or of the URDF text in UTF-8.
         urdfkin: Version of urdfkin.
 
     >>> import urdfkin
@@ -327,10 +327,11 @@ class Account:
 
     Attributes:
         checked: Combined comparison of all results that the oracle confirmed.
-        unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
+        unchecked: Number of results without a check: the oracle could not check them, or `verify="sample"`
+            did not select them.
         not_asked_for: Number of results of calls with verify=False.
-        counters: Pairs (array, index). The element of the array with this index is the number of unchecked
-            results that a fast evaluator has returned.
+        counters: Pairs (array, index), one for each fast evaluator. The element array[index] is the number of
+            unchecked results that the evaluator has returned.
     """
 
     checked: Comparison = field(default_factory=Comparison.of_nothing)
@@ -340,11 +341,11 @@ class Account:
 
     @property
     def unwanted(self) -> int:
-        """Number of all results of calls with verify=False, including the results in `counters`."""
+        """Number of results of calls with verify=False, including the results of fast evaluators."""
         return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
     def line(self, quantity: str) -> Line:
-        """Return the certificate's line about this quantity."""
+        """Return the line about this quantity for the certificate."""
         found = self.checked
         return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
 

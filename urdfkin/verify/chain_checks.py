@@ -24,12 +24,12 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare a chain with Pinocchio's placements; return a line of text about the agreement.
 
-    Pinocchio's frame of a joint is the frame of its child link. If the chain passes the joint from parent to
-    child, this frame comes after the joint's motion. If the chain passes the joint from child to parent, the
-    frame comes before the joint's motion. Pinocchio computes from the root to the two ends of the chain;
-    urdfkin computes from one end to the other end. The bound uses all joints and lengths of the two paths
-    from the root to the ends of the chain. These include all joints and lengths that Pinocchio or urdfkin
-    uses.
+    Pinocchio's frame of a joint is the frame of the joint's child link. In a chain that leads from the parent
+    link to the child link, this frame comes after the joint's motion. In a chain that leads from the child
+    link to the parent link, this frame comes before the joint's motion. Pinocchio computes the poses of the
+    first and the last frame of the chain from the root. urdfkin computes along the chain, from the first
+    frame to the last frame. The bound depends on all joints and lengths of the two paths from the root to
+    these two frames. These paths contain every joint and length of both computations.
 
     Args:
         verifier: Verifier of the robot.
@@ -78,7 +78,10 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
-    """Return a line of text about the error of an OPW solver's forward kinematics, or None if unchecked."""
+    """Check the forward kinematics of an OPW solver, and return a sentence about its error.
+
+    If Pinocchio cannot check the robot, return None.
+    """
     if verifier.cannot() is not None:
         return None
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))

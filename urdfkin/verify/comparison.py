@@ -15,9 +15,8 @@ from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
-#: The module with the compiled kernels of checks.
-#: A check of one configuration uses the kernels `CHECKS`.
-#: Only checks of batches use the kernel `_OF_BATCHES`.
+#: The module with the compiled kernels of checks. `CHECKS` names the kernels that check one configuration.
+#: `_OF_BATCHES` names the kernel that only checks of batches use.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
 _OF_BATCHES = "lengths"
@@ -25,17 +24,18 @@ _NO_BITS = np.empty(0, dtype=np.int64)
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """Return, for each result, the largest value of `bounds.disagreement` over the result's numbers.
+    """Return the largest difference between the numbers of each result and the oracle's numbers.
 
     Args:
         ours: urdfkin's results. The remaining axes after the first `axes` are those of one result. For
             placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
         theirs: The oracle's results, of the same shape.
-        scale: Scale of the bound; it broadcasts against the results.
+        scale: Scale of the bound. The shape of `scale` can be broadcast to the shape of the results.
         axes: Number of leading axes that are not axes of one result.
 
     Returns:
-        An array with the shape of the leading axes, in multiples of eps * scale.
+        One difference for each result, in multiples of eps * scale (`bounds.disagreement`). The shape of the
+        array is the shape of the first `axes` axes.
     """
     leading, own = ours.shape[:axes], ours.shape[axes:]
     n, numbers = math.prod(leading), math.prod(own)
@@ -59,7 +59,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
 
 
 def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
-    """Broadcast an array to a shape, and return it as `n` rows."""
+    """Broadcast an array to `shape`, then reshape it to (n, numbers)."""
     if x.shape != shape:
         x = np.broadcast_to(x, shape)
     return np.ascontiguousarray(x).reshape(n, numbers)
@@ -67,7 +67,7 @@ def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatA
 
 @np.errstate(all="ignore")
 def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return the largest difference in each row of results.
+    """Return the largest difference in each row, in multiples of eps * scale.
 
     The difference is inf for a row with a number that is not finite.
     """
@@ -83,7 +83,7 @@ def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArra
 
 
 def load_kernels() -> None:
-    """Compile all kernels, or load them from disk, before worker processes start.
+    """Compile all Numba kernels, or load them from disk, before worker processes start.
 
     Otherwise each worker process would compile all kernels itself.
     """

@@ -66,20 +66,22 @@ def check_analytical_jacobian(
 def check_relative_placement(
     bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return relative placements (n, frames, 4, 4) from an oracle, and their bound.
+    """Return the oracle's relative placements (n, frames, 4, 4), and the bound on urdfkin's error.
 
     A relative placement is the pose of frame b relative to frame a. Let s_a and s_b be the path lengths of
     the frames. Let k_a and k_b be the numbers of roundings of their placements. The position is R_a^T (p_b -
-    p_a). The errors of p_a and p_b add k_b s_b + k_a s_a to the error of the position. The error of R_a adds
-    k_a |p_b - p_a|. Since |p_b - p_a| <= s_a + s_b, the sum is at most (2 k_a + k_b) (s_a + s_b). The error
-    of the product of rotations is k_a + k_b. The difference and the products add rounding errors of about 5
-    eps. Each k contains the roundings of one additional joint, which are more than 5 eps.
+    p_a). All errors below are in multiples of eps. The errors of p_a and p_b contribute at most k_b s_b + k_a
+    s_a to the error of the position. The error of R_a contributes at most k_a |p_b - p_a|. Since |p_b - p_a|
+    <= s_a + s_b, the sum of these errors is at most (2 k_a + k_b) (s_a + s_b). The error of the rotation
+    R_a^T R_b is at most k_a + k_b. Computing the difference p_b - p_a and the products causes a rounding
+    error of about 5 eps. This error needs no additional bound, because k_a and k_b each count one joint more
+    than the path contains.
 
     Args:
         bound_of: Function for the bound of placements in the world.
         oracle: The oracle's model of the robot.
-        x: The configurations. Frame a is the last frame of the compiled tree of `x`.
-        ours: urdfkin's results; not used.
+        x: The configurations. Frame a is the last frame of `x.plan`.
+        ours: urdfkin's results, which this function does not use.
         by: The oracle.
     """
     other = cast("str", x.options["relative_to"])

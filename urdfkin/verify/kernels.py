@@ -30,7 +30,7 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 #: Bit pattern of inf, as an integer.
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: Number of rows that are loaded into the cache in advance.
+#: Row i + `_AHEAD` is loaded into the processor's cache while row i is compared.
 _AHEAD = 4
 
 
@@ -38,7 +38,7 @@ _AHEAD = 4
 def _finite(x, i):
     """Return whether a row is finite.
 
-    If x is not finite, 0 * x is NaN, and a sum with NaN in any order is NaN.
+    If x is not finite, 0 * x is NaN. Every sum that contains NaN is NaN.
     """
     total = 0.0
     for j in range(x.shape[1]):
@@ -48,7 +48,7 @@ def _finite(x, i):
 
 @helper(fastmath={"reassoc"})
 def _finite_difference(x, y, i):
-    """Return whether all differences of two rows are finite; any number that is not finite gives False."""
+    """Return whether all numbers in the difference of two rows are finite."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * (x[i, j] - y[i, j])
@@ -76,7 +76,7 @@ def _largest(ours, theirs, scale, i, k):
 
 @helper()
 def _is_in_threes(scale, k):
-    """Return whether the three linear rows of a scale are equal, and also the three angular rows."""
+    """Return whether the scale has three equal linear rows and three equal angular rows."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):
@@ -87,7 +87,7 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest of three differences for each group of three numbers.
+    """Write the largest difference of each group of three numbers to `units`.
 
     The three numbers of a group have the same scale. The difference is in multiples of eps * scale and may be
     NaN or inf.
@@ -117,20 +117,22 @@ def _most(x, count):
 
 @kernel(ROWS, ROWS, ROWS, SCRATCH, WHOLE, SCRATCH, SCRATCH, WHOLE)
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
-    """Write the largest difference in each row; inf for a row that is not finite.
+    """Write the largest difference in each row to `out`. If a row contains inf or NaN, write inf.
 
-    If the scale has fewer rows, its rows are repeated. The arrays `out_bits` and `bits` are views of `out`
-    and `units` as integers, because the compiler can vectorize the maximum of integers.
+    If `scale` has fewer rows than `out`, its rows are repeated. The arrays `out_bits` and `bits` contain the
+    doubles of `out` and `units` as integers, because the compiler can vectorize the maximum of integers but
+    not of doubles.
 
     Args:
         ours: urdfkin's results.
         theirs: The oracle's results.
         scale: Scale of the bound.
         out: The largest difference in each row.
-        out_bits: View of `out` as an array of integers.
-        unit: Scratch memory of the size of `scale`. It is used only if `scale` has fewer rows than `out`.
-        units: Scratch memory for one row.
-        bits: View of `units` as an array of integers.
+        out_bits: View of `out` that interprets the doubles as 64-bit integers.
+        unit: Working memory in the shape of `scale`. The kernel uses it only if `scale` has fewer rows than
+            `out`.
+        units: Working memory for one row.
+        bits: View of `units` that interprets the doubles as 64-bit integers.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):
@@ -172,8 +174,8 @@ def coupling(full, columns, index, factor, out):
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
-#: `_STATE` is the number of values in the state of a link. `_FREE` is the number of values in `free` for a
-#: planar or floating joint.
+#: The state of a link consists of `_STATE` values. The array `free` contains `_FREE` values for each planar
+#: and floating joint.
 _STATE = _FREE = 5
 
 
@@ -184,7 +186,7 @@ def _sum(x, y):
 
 @helper()
 def _product(x, y):
-    """Return the product of two lengths, as `urdfkin.kinematics.number_kinds.product` computes it."""
+    """Return the product of two lengths. It is equal to `urdfkin.kinematics.number_kinds.product`."""
     return SMALLEST if x * y < SMALLEST and x != 0.0 and y != 0.0 else x * y
 
 
@@ -222,9 +224,9 @@ def _of_row(x, row, at):
 
 @helper()
 def _read(x, first, m, at, factor, to):
-    """Write factor * |x[k, at]| to the array `to` for m configurations k, from `first` on.
+    """Write factor * |x[k, at]| to the array `to`, for the m configurations k that begin with `first`.
 
-    An array `x` with one row is used for all configurations.
+    If `x` has only one row, this row is used for all configurations.
     """
     step = 1 if len(x) > 1 else 0
     for i in range(m):
@@ -254,22 +256,25 @@ def _over_free(before, after, first, m, d, free, at):
 
 @kernel(TABLE, ROWS, TABLE, NUMBERS, ROWS, ROWS, ROWS, ROWS, ROWS, STATES, SCRATCH)
 def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
-    """Write `Magnitudes.p`, `w`, `vel`, `alpha` and `acc` for each configuration and frame.
+    """Compute the fields `p`, `w`, `vel`, `alpha` and `acc` of `Magnitudes`, and write them to `out`.
 
     Args:
-        links: Kind, index in q, index in v, and previous moving joint (parent) of each moving joint.
-        sizes: Length of the path from the previous moving joint, mimic multiplier and mimic constant of each
-            moving joint.
-        ends: For each frame: the last moving joint before it, and its index in the output.
+        links: For each moving joint: its kind, its index in q, its index in v, and the moving joint before
+            it.
+        sizes: For each moving joint: the length of the path from the moving joint before it, its mimic
+            multiplier, and its mimic offset.
+        ends: For each frame: the last moving joint before the frame, and the index of the frame in `out`.
         tips: Length of the path from the last moving joint to each frame.
-        q: Coordinates. In q, v, a, free and base, an array with one row is used for all configurations.
+        q: Coordinates. If one of the arrays q, v, a, free and base has only one row, this row is used for all
+            configurations.
         v: Joint velocities.
         a: Joint accelerations.
-        free: Five lengths for each planar and floating joint (`urdfkin.verify.bounds._free_lengths`).
+        free: Five lengths for each planar and floating joint: of the displacement, the velocities and the
+            accelerations (`urdfkin.verify.bounds._free_lengths`).
         base: State of the base.
-        s: Scratch memory for a block of configurations. It has the states of the base and of all moving
+        s: Working memory for a block of configurations. It contains the states of the base and of all moving
             joints, and one more state.
-        out: p, w, vel, alpha, acc.
+        out: The computed p, w, vel, alpha and acc.
     """
     frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]
     n = len(out) // max(1, _STATE * frames)

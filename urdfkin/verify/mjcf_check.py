@@ -53,10 +53,10 @@ class MjcfReading:
         urdf: The tree as a URDF text.
         listed: Elements of the file that the tree does not contain.
         path: The file; None for a text.
-        answer: The process's answer about the robot, with its frames and MuJoCo's results.
-        not_whole: Reason why MuJoCo could compile the file only without shapes and inertias; None if MuJoCo
-            compiled the complete file.
-        pinocchio: The process's answer about Pinocchio's reader; None if there is no such answer.
+        answer: What the separate process returned: data of the robot, its frames, and MuJoCo's results.
+        not_whole: Reason why MuJoCo rejected the complete file, if MuJoCo compiled the file without shapes
+            and inertias; else None.
+        pinocchio: What the separate process returned about Pinocchio's reader; None if nothing.
     """
 
     urdf: str
@@ -139,7 +139,7 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
 def _is_answer(line: bytes) -> bool:
     """Return whether a line of the process's output is a complete answer.
 
-    Other lines are text that a library printed, or the first part of an answer of a killed process.
+    Other lines are text that a library printed, or an incomplete answer of a process that was killed.
     """
     return line.startswith(b"{") and line.endswith(b"}\n")
 
@@ -155,16 +155,16 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
         A line of text about the result, for the certificate.
 
     Raises:
-        OracleError: MuJoCo's placement of a body or site differs by more than the bound. Or a mimic rule of
-            the tree differs from the joint equalities in MuJoCo's model.
+        OracleError: MuJoCo's placement of a body or site differs by more than the bound, or MuJoCo's model
+            has a joint equality that differs from the tree's mimic rule.
     """
     tree, answer = verifier.tree, read.answer
     q = unpacked(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # urdfkin and MuJoCo round, and the angles in the URDF text are rounded too.
-    # The bound is therefore twice the bound for a comparison with MuJoCo.
+    # urdfkin and MuJoCo make rounding errors, and the angles in the URDF text are rounded too. Therefore, the
+    # bound is twice the bound for a comparison with MuJoCo on a URDF.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -190,7 +190,7 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
 def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
     """Compare the mimic rules with the joint equalities in MuJoCo's model.
 
-    The result is the largest ratio of a difference to its bound, or None without mimic rules.
+    Return the largest ratio of a difference to its bound. If there are no mimic rules, return None.
     """
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])
@@ -225,7 +225,7 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _whole(found: Mapping[str, Any]) -> FloatArray:
-    """Return matrices (n, frames, 4, 4) from their upper three rows; an answer contains only these rows."""
+    """Return placements (n, frames, 4, 4) from their upper three rows."""
     rows = unpacked(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0

@@ -1,4 +1,4 @@
-"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader; this program is a separate process.
+"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader. This module runs in a separate process.
 
 A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory.
 A defect of a parser can crash the process. Therefore, a separate process compiles the file, and the caller's
@@ -82,9 +82,9 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the answers to a request.
 
     Args:
-        request: Mapping with `path` or `text`, with `name` (the file's name in messages), and with `samples`.
-            `samples` is the number of random configurations in addition to the zero configuration; 0 means no
-            configuration at all.
+        request: Mapping with the keys `path` or `text`, `name` and `samples`. `name` is the file's name in
+            messages. `samples` is the number of random configurations in addition to the zero configuration.
+            If `samples` is 0, the zero configuration is left out too.
     """
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
@@ -145,7 +145,7 @@ def packed(numbers: FloatArray) -> dict[str, Any]:
 
 
 def unpacked(found: Mapping[str, Any]) -> FloatArray:
-    """Return the array from the data that `packed` returned."""
+    """Return the array that `packed` converted to JSON data."""
     numbers = np.frombuffer(base64.b64decode(found["base64"]), dtype="<f8")
     return numbers.reshape([int(n) for n in found["shape"]]).astype(np.float64)
 

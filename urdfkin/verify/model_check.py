@@ -37,7 +37,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
 
     Args:
         verifier: Verifier of the robot.
-        made: The tree that was read from the model, with the index in the model for each link.
+        made: The tree that urdfkin made from the model, and the index of each link in the model.
         source: The Pinocchio model, or a RobotWrapper that contains it.
 
     Returns:
@@ -54,8 +54,8 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # urdfkin and Pinocchio round, and the angles in the URDF text are rounded too.
-    # Therefore, twice the bound is allowed.
+    # urdfkin and Pinocchio make rounding errors, and the angles in the URDF text are rounded too. Therefore,
+    # the bound is doubled.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -136,7 +136,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return the sum of |R^T R - 1| over the rotation matrices R of base and tool.
+    """Return |R^T R - 1| for the rotation matrix of the base plus the same norm for the tool.
 
     The numbers of these matrices may be rounded to six digits.
     """

@@ -4,18 +4,18 @@ MuJoCo reads the positions and axes of links and joints from the URDF text with 
 computes with unit quaternions, and its six-vectors have a centre of mass as the reference point. urdfkin and
 Pinocchio use neither method. Before MuJoCo reads the text, this module makes these changes:
 
-- Meshes and inertials are removed. Each link becomes a body. Only the root has a mass, so that the centre of
-  mass, MuJoCo's point of reference, is the root's origin.
+- Meshes and inertials are removed. Each link becomes a body. Only the root has a mass. Therefore, the centre
+  of mass, to which MuJoCo's results refer, is the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint. A planar joint becomes two slide joints and a
-  hinge. MuJoCo's own free joint can connect a body to the world only.
+  hinge. MuJoCo's own free joint is not used, because it can only connect a body to the world.
 - The rules of `rules_of_text` couple the mimic joints. MuJoCo would turn the mimic rules into constraints,
   and its kinematics ignores constraints.
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. If J is MuJoCo's Jacobian, the robot's Jacobian
 is J S. The matrix S contains the multipliers of mimic joints. For a floating or planar joint, S also contains
-a rotation matrix. urdfkin's linear velocity of such a joint is in the axes of the child link. The axes of the
-slide joints that replace the joint are fixed in the parent link.
+a rotation matrix. This matrix converts urdfkin's linear velocity, which is in the axes of the child link, to
+the axes of the slide joints. The axes of the slide joints are fixed in the parent link.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ from urdfkin.verify.pinocchio import depth_of
 
 #: Mass (kg) and moments of inertia (kg m^2) that each link has while MuJoCo reads the text.
 _MASS = "1"
-#: Longest chain of links that is accepted.
-#: MuJoCo rejects more than 1,023 links, after a time that grows with the square of their number.
+#: Longest chain of links that is accepted. MuJoCo rejects a robot with more than 1,023 links, but only after
+#: a time that grows with the square of the number of links.
 _DEEPEST = 1_000
 #: MuJoCo's joints for a planar or floating joint, in the order of its coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
@@ -70,10 +70,10 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Indices of a moving joint in MuJoCo's vectors and in urdfkin's vectors, with the joint's mimic rule.
+    """Indices of a moving joint in the vectors q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
 
-    For the moving base, the indices q and v are -1. For a locked joint, v is -1 and the offset is the joint's
-    value.
+    The joints of a moving base have the indices q = v = -1, because they are not in urdfkin's q and v. A
+    locked joint has the index v = -1, and its value is stored as the offset.
     """
 
     kind: str
@@ -167,7 +167,6 @@ class MujocoOracle(Oracle):
     def _laid_out(
         self, joints: Sequence[_Joint], rules: Mapping[str, Mimic], held: Mapping[str, float]
     ) -> Iterator[_Place]:
-        """Yield the indices of each moving joint in urdfkin's layout and in MuJoCo's."""
         leaders, q, v = dict[str, tuple[int, int]](), 0, 0
         for joint in joints:
             sizes = _SIZES[joint.kind]
@@ -267,7 +266,7 @@ class MujocoOracle(Oracle):
 
         Args:
             x: The query.
-            count: Number of inputs to use: 1 for q, 2 for q and v, 3 for q, v and a.
+            count: Number of inputs that MuJoCo receives: 1 for q, 2 for q and v, 3 for q, v and a.
             read: Function (body, index) that reads `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
@@ -299,7 +298,7 @@ class MujocoOracle(Oracle):
         return J
 
     def _six(self, function: Callable[..., None], body: int) -> FloatArray:
-        """Return [linear; angular] (6,) of the body's origin in world axes; MuJoCo has [angular; linear]."""
+        """Return the velocity or acceleration [linear; angular] (6,) of the body's origin in world axes."""
         six = np.empty(6)
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
         return np.roll(six, 3)
@@ -377,7 +376,7 @@ class MujocoOracle(Oracle):
         return S_rate
 
     def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
-        """Return the rotation of a floating or planar joint, and the number of its slide joints.
+        """Return the rotation of a floating or planar joint, and the number of slide joints that replace it.
 
         The rotation is an array (n, 3, 3) for a floating joint and (n, 2, 2) for a planar joint.
         """
@@ -392,8 +391,8 @@ class MujocoOracle(Oracle):
 def _weighing_its_root(model: Any, root: str) -> Any:
     """Set all masses except the root's to zero, so that the centre of mass is at the root's origin.
 
-    MuJoCo computes velocities relative to the centre of mass. With the centre of mass at the root's origin, a
-    lever arm of length zero is computed as exactly zero.
+    MuJoCo computes velocities relative to the centre of mass. If the centre of mass is at the root's origin,
+    MuJoCo computes a lever arm of length zero as exactly zero.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):

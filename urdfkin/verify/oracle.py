@@ -18,7 +18,7 @@ joints in the oracle's model. There are two exceptions. Both conversions parse u
 `urdfkin.errors.numbers`, and both use the same values of named poses.
 
 Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so this module reads the
-rules. The module parses the text again at the first check.
+rules. For this, the module parses the URDF text a second time when the first result is checked.
 
 Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
 planar joint three, a floating joint seven, and a mimic joint none.
@@ -115,16 +115,17 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
     return {**lock, **moved}
 
 
-#: For each pair (nq, nv) of a joint in Pinocchio: the joint's number of coordinates in urdfkin.
+#: A joint of Pinocchio has nq coordinates and nv velocities. `_COORDINATES` contains, for each pair (nq, nv),
+#: the number of coordinates of the same joint in urdfkin.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _Place(NamedTuple):
-    """The first indices of a joint's coordinates and joint velocities, and the joint's mimic rule.
+    """First index of a joint's coordinates, first index of its joint velocities, and its mimic rule.
 
-    The indices are for Pinocchio (`full_q`, `full_v`) and for urdfkin (`q`, `v`). `sizes` is the joint's (nq,
-    nv) in Pinocchio.
+    `full_q` and `full_v` are the indices in Pinocchio's vectors. `q` and `v` are the indices in urdfkin's
+    vectors. `sizes` is the joint's pair (nq, nv) in Pinocchio.
     """
 
     sizes: tuple[int, int]
@@ -142,7 +143,7 @@ class Layout:
     Args:
         model: Pinocchio's model.
         joints: Pinocchio's indices of the robot's joints, in order.
-        names: Their names.
+        names: Names of these joints.
         rules: The resolved rule of each mimic joint.
 
     Attributes:
@@ -183,9 +184,9 @@ class Layout:
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
-        """Return the indices in Pinocchio's q and in urdfkin's q, the multipliers and the offsets.
+        """Return the data of all joints with the given pair (nq, nv) in Pinocchio.
 
-        The joints are those with the given (nq, nv) in Pinocchio.
+        The data are four arrays: indices in Pinocchio's q, indices in urdfkin's q, multipliers and offsets.
         """
         own = [place for place in self._places if place.sizes == sizes]
         return (
@@ -196,7 +197,7 @@ class Layout:
         )
 
     def _rates(self) -> tuple[Places, FloatArray]:
-        """Return, for each joint velocity of Pinocchio, its index in v and its factor in G.
+        """Return two arrays over Pinocchio's joint velocities: the index in v, and the factor in G.
 
         The index and the factor are 0 for the base's velocities.
         """
@@ -237,7 +238,10 @@ class Layout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G without the base's columns; G adds columns of mimic joints to other columns."""
+        """Return J_full G without the base's columns.
+
+        G adds the column of a mimic joint to the column of the mimicked joint.
+        """
         if self._same_v:
             return full
         return coupled(full, self._columns, self._index, self._factor, self.nv)
@@ -256,8 +260,9 @@ class Frames:
         robot: Name of the robot, for errors.
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
-        carriers: For the index of a child link's frame: the index of its parent joint's frame. If a link's
-            frame is not in `carriers`, the frame of its parent joint has the same index.
+        carriers: Mapping from the index of a link's frame to the index of the frame of the link's parent
+            joint. This mapping leaves out each link whose frame has the same index as the frame of its parent
+            joint.
     """
 
     def __init__(
@@ -302,7 +307,7 @@ class Frames:
 
 
 def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
-    """Return the frames of a model that Pinocchio's URDF parser returned.
+    """Return the indices of all frames of a model from Pinocchio's URDF parser.
 
     Args:
         model: The model.
@@ -323,7 +328,7 @@ def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
 class BaseNumbers(Protocol):
     """Placement, velocity and acceleration of the base, as the user gave them.
 
-    Each array has at most one leading batch axis.
+    An array of several samples has one additional axis at the front.
     """
 
     @property
@@ -361,8 +366,8 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # For a rotation, K + I = 4 q q^T.
-    # The product (K + I) q removes the components of q along the other eigenvectors.
+    # For a rotation, K + I = 4 q q^T. The computed q has small components along the other eigenvectors. The
+    # product (K + I) q removes them.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -381,7 +386,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Return R^T times the linear half and R^T times the angular half of a six-vector.
+    """Rotate the linear part and the angular part of a six-vector by R^T.
 
     The rotation is given by a quaternion with the vector part u and the scalar part w. Let y be the linear or
     the angular half, and let c be the cross product of y and u. Then R^T y is y + 2 w c + 2 (c x u).
@@ -396,8 +401,8 @@ def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
 #: Largest number of names that an error lists.
 _NAMED = 5
 
-#: Names of a joint's coordinates and of its joint velocities. The key is nv of the joint: 3 for a planar
-#: joint, 6 for a floating joint.
+#: Names of a joint's coordinates and of its joint velocities. The keys are the numbers of joint velocities: 3
+#: for a planar joint, 6 for a floating joint.
 _OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 _OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
@@ -406,7 +411,7 @@ class _Names:
     """Lookup from names to indices in q or v.
 
     Args:
-        joints: Name and number of joint velocities of each joint, in order.
+        joints: Pairs of a joint's name and its number of joint velocities, in the order of the joints.
         of: `_OF_Q` or `_OF_RATES`.
 
     >>> names = _Names([("base", 3), ("elbow", 1)], _OF_Q)
@@ -469,18 +474,19 @@ class BaseRows(NamedTuple):
 
 
 class QueryBatch(NamedTuple):
-    """A query: some configurations as a flat batch.
+    """The arguments of a call for an oracle: configurations with one batch axis, frames, and a base.
 
     Attributes:
-        frames: Names of the frames, as the user gave them, or the frames of moving joints.
+        frames: Names of the frames, as the user gave them. If `joints` is True, the frames are `JointFrame`
+            objects.
         inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv). A method ignores inputs that it does not
             need.
         reference: The reference frame, as the user gave it. Placements ignore it.
         base: Motion of the base; None: fixed at the world origin.
         joints: True: use the library's functions for joints, if it has them. Each frame is a `JointFrame`.
-        divided: True: `frames` is one part of a longer list, which is computed in parts. Even for one frame,
-            the functions for several frames are then used, so that the results are the same as for the whole
-            list.
+        divided: True: the caller has divided a longer list of frames, and `frames` contains one part of this
+            list. Then the oracle uses its functions for several frames even for one frame, so that the
+            results are the same as for the whole list.
 
     >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
     >>> x.q.shape, x.v.shape, x.reference.name
@@ -517,9 +523,10 @@ class OracleQuery:
         frame: Name of a frame, or several names.
         reference: A `Reference` or its name.
         base: Motion of the base; None: fixed at the world origin.
-        inputs: q, or q and v, or q, v and a, as numbers that broadcast.
-        named: For each input: the original argument if it contains names, otherwise None.
-        joints: For each joint with coordinates, in order: its name and its number of joint velocities.
+        inputs: q, or q and v, or q, v and a, as arrays of numbers. Their batch shapes can differ (NumPy
+            broadcasting).
+        named: Original argument of each input, if this argument contains names; otherwise None.
+        joints: Name and number of joint velocities of each joint with coordinates, in order.
     """
 
     def __init__(
@@ -550,7 +557,7 @@ class OracleQuery:
     def _by_name(
         self, x: FloatArray, given: str | Mapping[str, ArrayLike], of: Mapping[int, tuple[str, ...]]
     ) -> FloatArray:
-        """Write the numbers that were given by name into `x`, and return `x`."""
+        """Replace the numbers in `x` that the user gave by name. Return `x`."""
         names = _Names(self._joints, of)
         for name, value in given.items() if isinstance(given, Mapping) else names.pairs(given):
             x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
@@ -587,7 +594,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
-        """Convert results in the user's shape to the shape (n, frames, ...); one result has `axes` axes.
+        """Reshape results from the user's shape to (n, frames, ...). One result has `axes` axes.
 
         Raises:
             OracleError: the shape does not match the query.
@@ -617,8 +624,9 @@ def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic
 class Oracle:
     """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    A subclass builds the library's model in `__init__` and computes the five quantities below. Each of these
-    methods takes a query and returns an array (n, frames, ...).
+    A subclass builds the library's model in `__init__`. It implements five methods: `placements`,
+    `velocities`, `accelerations`, `jacobians` and `jacobian_rates`. Each method takes a query and returns an
+    array (n, frames, ...).
 
     Args:
         text: The URDF text.
@@ -626,7 +634,8 @@ class Oracle:
             joints.
         mimic: True: couple mimic joints. False: every mimic joint moves freely.
         moving_base: Build the model on a free-flyer, which receives the base's motion.
-        root_joint: "floating" or "planar" if the tree has such a root joint, which the text does not contain.
+        root_joint: "floating" or "planar" if urdfkin has added a root joint of this kind to the tree. The
+            URDF text does not contain this joint.
         lock: Value (rad or m) of each locked joint, which is a fixed joint in the tree.
 
     Attributes:
@@ -736,15 +745,15 @@ def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray
     """Return the product J_full G, the Jacobian columns for urdfkin's joint velocities v.
 
     For large batches, a compiled kernel reads all Jacobians from memory only once; NumPy would read them once
-    for each column. With NumPy, the addition would take longer than Pinocchio's computation of the Jacobians.
-    The kernel and NumPy return equal numbers.
+    for each column. With NumPy, adding the columns would take longer than Pinocchio's computation of the
+    Jacobians. The kernel and NumPy return equal numbers.
 
     Args:
         full: (..., Pinocchio's nv) columns for all joints.
-        columns: Indices of the columns of J_full to add, in the order of the additions.
+        columns: Indices of the columns of J_full that the function adds, in the order of the additions.
         index: (Pinocchio's nv,) index in v for each column of J_full.
-        factor: (Pinocchio's nv,) number by which each column of J_full is multiplied. These numbers are the
-            nonzero elements of G.
+        factor: (Pinocchio's nv,) factor of each column of J_full. These factors are the nonzero elements of
+            G.
         nv: Length of v.
 
     Returns:

@@ -28,8 +28,8 @@ class OracleLibrary:
         title: Name of the oracle in sentences.
         package: Name of the library's Python package.
         version: Function that returns the installed version without importing the library.
-        oracle: Function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the oracle's
-            model of a robot.
+        oracle: Function that returns the oracle's model of a robot. The arguments are text, tree, mimic=,
+            moving_base=, root_joint= and lock=.
         size: Function that returns the `Magnitudes` for error bounds of this oracle
             (`urdfkin.verify.bounds`). Its argument is the `Magnitudes` for Pinocchio.
     """

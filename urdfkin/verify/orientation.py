@@ -16,22 +16,24 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio import pinocchio
 
-#: Sum of the rounding errors of urdfkin and of Pinocchio, in eps; the error of each is less than 8 eps.
-#: These errors are counted like the errors of a joint in `urdfkin.kinematics.roundings`.
-#: For angles, the operations are arctan2, sines, cosines and products of three numbers.
-#: For quaternions, the operations are a square root, a quotient and products of two numbers.
+#: Upper bound on the sum of the rounding errors of urdfkin and of Pinocchio, in eps. The error of urdfkin and
+#: the error of Pinocchio are less than 8 eps each. These errors are counted like the errors of a joint in
+#: `urdfkin.kinematics.roundings`. For angles, the operations are arctan2, sines, cosines and products of
+#: three numbers. For quaternions, the operations are a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0
 
 
 def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
     """Compare rotations that Pinocchio computes from angles or quaternions with the original rotations.
 
-    The bound includes the distance of `R` from the nearest rotation matrix. Angles and quaternions represent
-    exact rotations only, so Pinocchio's rotation cannot be closer to `R` than this distance.
+    Rounding makes `R` differ from an exact rotation matrix. Angles and quaternions can represent only exact
+    rotations, so Pinocchio's rotation must differ from `R` as well. Therefore, the bound includes the
+    distance between `R` and the nearest rotation matrix.
 
     Args:
         numbers: (n, 3) roll, pitch, yaw in rad, or (n, 4) quaternions, scalar last.
-        R: (n, 3, 3) rotations from which the numbers were computed; these rotations were checked before.
+        R: (n, 3, 3) rotations from which the angles or quaternions were computed. The caller has already
+            checked these rotations.
         frame: Name of the frame, for the message.
         again: Function that returns a shell command, or lines of Python, to compute a sample again.
 

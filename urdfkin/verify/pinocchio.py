@@ -4,14 +4,14 @@ No other module but `urdfkin.verify.adapters` imports Pinocchio. On PyPI, Pinocc
 PyPI project `pinocchio` is a different one: plugins for the test runner nose, in a module that is also called
 `pinocchio`. If both projects are installed, Python finds the module of the plugins first.
 
-The oracle shares no code with urdfkin's computation. The oracle reads the URDF text with
-Pinocchio's own parser. `urdfkin.verify.oracle` determines three things a second time, from Pinocchio's model
-and the user's original numbers: the frame of a name, the joint of each number of q, and the base's motion.
+The oracle shares no code with urdfkin's computation. The oracle reads the URDF text with Pinocchio's own
+parser. `urdfkin.verify.oracle` converts the user's original arguments a second time. That module finds frames
+and joints by their names in Pinocchio's model, and it converts the base's motion.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
-robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text a second time.
-The rules define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The
-index "full" marks Pinocchio's vectors, in which mimic joints have numbers of their own.
+robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text a second time. The
+rules define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The name
+"full" marks Pinocchio's vectors, which contain numbers for the mimic joints too.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def pinocchio() -> Any:
             of the same name.
     """
     try:
-        import pinocchio as found  # noqa: PLC0415  slow to import, needed for checks only
+        import pinocchio as found  # noqa: PLC0415  a slow import, only for checks
     except ImportError as error:
         if error.name == "pinocchio":
             raise InstallationError("Pinocchio is not installed", remedy=f"pip install {_WANTED}") from None
@@ -84,7 +84,7 @@ def version() -> str:
 
 
 def _impostor(found: Any) -> InstallationError:
-    """Return the error for a different project with Pinocchio's name; its message states the remedy."""
+    """Return the error for the case that a different project is installed under Pinocchio's name."""
     file = found.__file__ or next(iter(found.__path__), "a folder without modules")
     owner = _owner(Path(file))
     cure = f"pip uninstall {owner[0]}" if owner else f"rename or remove {file}"
@@ -118,8 +118,8 @@ _SHALLOW = 100
 #: Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured), so the memory stays below 2 GB.
 MOST_RATES = 315
 
-#: Number of Pinocchio's result values that are collected and then copied together.
-#: These values fit into the processor's cache.
+#: Pinocchio's results are collected and copied to one array. `_AT_A_TIME` is the number of floating-point
+#: values that are copied at a time. They fit into the processor's cache.
 _AT_A_TIME = 16384
 #: Function that returns the results for the next configurations; the argument is their number.
 _Next = Callable[[int], list[FloatArray]]
@@ -181,11 +181,12 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
     for i, (name, value) in zip(ids, held.items(), strict=True):
         if i >= model.njoints:
             raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
-        at, numbers = model.joints[i].idx_q, model.joints[i].nq  # 0 for a mimic joint of a coupled model
+        # with mimic=True, a mimic joint has nq = 0
+        at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` finds frames by their names only, but a link may have the same name as a joint. The
-    # names of the links therefore have a prefix for a short time. No name in an XML text can contain this
-    # prefix.
+    # `buildReducedModel` finds frames by their names only, but a link may have the same name as a joint.
+    # Therefore, the names of the links have a prefix while Pinocchio builds the reduced model. No name in an
+    # XML text can contain this prefix.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_MARK + frame.name
@@ -203,7 +204,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `check` has already reported all known reasons for a refusal, so the reason here is unknown.
+        # `check` raises an error for each known reason why Pinocchio rejects a text. This reason is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -233,7 +234,7 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Add a free-flyer joint for the base's motion before the model; an existing root joint stays.
+        """Add a free-flyer joint for the base's motion in front of the model. An existing root joint is kept.
 
         Returns:
             The new indices of the joints and of the frames. The frame of the world becomes the frame of the
@@ -268,7 +269,7 @@ class PinocchioOracle(Oracle):
         return self._pin.ReferenceFrame.names[name]
 
     def _inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
-        """Return Pinocchio's vectors for q, or for q and v, or for q, v and a.
+        """Convert urdfkin's q, v and a to Pinocchio's vectors. Only the first `count` inputs are converted.
 
         Velocities and spatial accelerations of the free-flyer of a moving base are in the base's own axes.
         """
@@ -334,7 +335,6 @@ class PinocchioOracle(Oracle):
             yield self._layout.couple(block)
 
     def _frame_jacobians(self, x: QueryBatch) -> _Next:
-        """Return a function of m that returns the Jacobians of the frame for the next m configurations."""
         (one,), wanted = self._ids(x), self._reference(x.reference)
         found = self._each(self._pin.computeFrameJacobian, self._inputs(x, 1), one, wanted)
         return lambda n: list(islice(found, n))
@@ -362,7 +362,8 @@ class PinocchioOracle(Oracle):
         - Pinocchio returns the numbers in Eigen's order (the first index varies fastest), but in a NumPy
           array with C order (the last index varies fastest).
         - In LOCAL, entries [i, j] with i and j of the same joint are not 0 if another joint precedes this
-          joint. These entries must be 0, because the joint moves its own axes together with the frame.
+          joint. The true value of these entries is 0, because the joint does not move its own axes relative
+          to the frame.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._ids(x), self._reference(x.reference), model.nv
@@ -418,7 +419,7 @@ class PinocchioOracle(Oracle):
 
 
 def _stacked(compute: _Next, *shape: int) -> FloatArray:
-    """Return the results as one array with the given shape (n, frames, ...)."""
+    """Return all results of `compute` in one array of the given shape (n, frames, ...)."""
     out = np.empty(shape)
     for _ in _blocks(compute, shape[0], out):
         pass
@@ -426,16 +427,17 @@ def _stacked(compute: _Next, *shape: int) -> FloatArray:
 
 
 def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
-    """Write the results of n configurations to an array, and yield each written part of it.
+    """Write the results of n configurations to `memory` in blocks. Yield the array of each block.
 
     If the results contain no numbers, nothing is computed. Pinocchio 4.1 crashes the process for a Jacobian
     without columns, and returns a vector for one column.
 
     Args:
-        compute: Function of m that returns the results of all frames for the next m configurations.
+        compute: Function with the argument m, which returns the results of all frames for the next m
+            configurations.
         n: Number of configurations.
-        memory: (n or one block, frames, ...) array that is written. With n rows, the blocks follow each
-            other. With fewer rows, each block overwrites the block before it.
+        memory: Array (rows, frames, ...) for the results. An array of n rows finally contains all results. In
+            a smaller array, each block overwrites the block before it.
     """
     if 0 in memory.shape:
         yield memory

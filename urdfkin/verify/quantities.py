@@ -1,7 +1,8 @@
 """The table of quantities: names, shapes, functions for computation and checks, bounds and help texts.
 
 Many parts of urdfkin use this table, for example the methods of `Robot`, the checks, reports and the command
-line. For a new quantity, add a row to this table, the functions that the row names, and a page in docs.
+line. To add a quantity, add a row to this table. Then write the functions that the row names, and a page in
+docs.
 
 Functions are given by name and imported at first use, so that `--help` does not import NumPy.
 
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 #: The rows of a velocity, an acceleration or a Jacobian.
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
-#: Function of (oracle, part, ours, by) that returns the oracle's results and the bound.
+#: Function with the arguments (oracle, part, ours, by). It returns the oracle's results and the bound.
 Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
@@ -60,32 +61,32 @@ class Quantity:
         name: Name in certificates, errors and reports.
         title: Name in sentences.
         inputs: The inputs of the quantity: "q", "qv" or "qva".
-        shape: Shape of one result; "nv" stands for the robot's nv.
+        shape: Shape of one result. The string "nv" is replaced by the robot's number of joint velocities.
         equations: Equations of the textbook.
-        compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns (n, frames, ...). If
-            `recursive` is False, a method of `Robot` calls the function with other arguments.
-        ask: Function (oracle, query) that returns the oracle's results, (n, frames, ...).
-        blocks: Function (oracle, query) that yields the oracle's results in blocks of configurations, for
-            large results.
-        scale: Function (plan, magnitudes, reference) that returns the scale of the quantity's bound
+        compute: Function that returns urdfkin's results (n, frames, ...). Its arguments are (plan, *inputs,
+            reference, base=, out=, threads=). If `recursive` is False, the arguments are different.
+        ask: Function with the arguments (oracle, query), which returns the oracle's results (n, frames, ...).
+        blocks: Generator with the arguments (oracle, query), which yields the oracle's results for one block
+            of configurations at a time. It is used for large results.
+        scale: Function with the arguments (plan, magnitudes, reference), which returns the scale of the bound
             (`urdfkin.verify.bounds`).
-        factors: Number of factors for the bound of the quantity in LOCAL_WORLD_ALIGNED; see the table in
-            `urdfkin.verify.bounds`.
-        against: Function (oracle, part, ours, by) that returns the oracle's results and the bound. If it is
-            given, `ask` and `scale` are not used for the check.
-        exact: Function (motion, link, reference) that returns intervals with the true values. The accuracy
-            study and `Robot.enclose` use it.
+        factors: Number of factors in the bound of the quantity (`urdfkin.verify.bounds`), for the reference
+            frame LOCAL_WORLD_ALIGNED.
+        against: Function with the arguments (oracle, part, ours, by). It returns the oracle's results and the
+            bound. If a quantity has this function, its check does not call `ask` and `scale`.
+        exact: Function with the arguments (motion, link, reference), which returns intervals that contain the
+            true values. The accuracy study and `Robot.enclose` call this function.
         recursive: True if the forward recursion computes the quantity for any frames.
-        validated: True if `validate`, the accuracy study and plots include the quantity. A Hessian is left
-            out: it has nv times as many numbers as a Jacobian, and consists of products of the Jacobian's
-            columns.
-        referred: True if the quantity depends on a reference frame. If False, as for a placement, `compute`
-            has no argument for a reference frame.
+        validated: True if `validate`, the accuracy study and plots include the quantity. The Hessian is not
+            included, because it has nv times as many numbers as a Jacobian and consists of products of the
+            Jacobian's columns.
+        referred: True if the quantity depends on a reference frame. If False, for example for the placement,
+            `compute` has no argument `reference`.
         of: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
         head: Heading of the column in reports. Quantities with the same heading share a column.
         labels: Names of a result's rows, if any.
-        units: Unit of each group of three numbers, by the group's name.
-        command: Command that computes one case again, if there is one.
+        units: Mapping from the name of a group of three numbers to the unit of the group.
+        command: Name of the urdfkin command that computes the quantity, if there is one.
         summary: Line in the list of commands, if the quantity has a command of its own.
         page: Help text of the command, without the summary.
         example: Example command line.
@@ -155,7 +156,7 @@ class Quantity:
         return bound
 
     def truth(self, motion: Any, link: int, reference: Reference | None) -> NDArray[Any]:
-        """Return the exact values of one link."""
+        """Return the intervals that contain the true values of the quantity for one link."""
         assert self.exact is not None
         values: NDArray[Any] = self.exact(motion, link, *self._in(reference))
         return values
@@ -366,7 +367,7 @@ def validated(of: str = "frames") -> list[Quantity]:
 
 
 def compared() -> str:
-    """Return the names of the quantities that a validation compares, as part of a sentence."""
+    """Return a text that lists the quantities that a validation compares."""
     return _listed([row.title for row in validated()])
 
 
@@ -385,7 +386,7 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def by_command() -> dict[str, Quantity]:
-    """Return the quantities that a command of the command line computes, by the name of the command."""
+    """Return a mapping from the name of each urdfkin command to the quantity that the command computes."""
     return {row.command: row for row in recursive_quantities() if row.command}
 
 

@@ -9,8 +9,8 @@ faults and does not count them as differences:
 - The reader yourdfpy ignores the attribute `quat_xyzw` of an origin.
 - The reader yourdfpy does not normalise axes.
 
-For a missing number, yourdfpy returns None. The default of the specification replaces this None before the
-comparison.
+If a number is missing in the URDF, yourdfpy returns None. Before the comparison, urdfkin replaces this None
+by the default value from the URDF specification.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ class SecondReading:
     Attributes:
         by: Name and version of the reader.
         joints: Number of compared joints, fixed joints included.
-        differences: Differences between the two readings, each caused by an error of one reader.
+        differences: Differences between the trees of urdfkin and yourdfpy, caused by an error of urdfkin or
+            of yourdfpy.
         known: Differences that are known faults of yourdfpy.
         unread: Reason why yourdfpy cannot read the text; None if it can.
     """
@@ -97,7 +98,7 @@ def second_reading(
         root_joint: Whether `load` has added the first joint and link, which the text does not contain.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    if "<!DOCTYPE" in text:  # a document type could name files and entities, which yourdfpy would read
+    if "<!DOCTYPE" in text:  # yourdfpy would read the files and entities that a document type names
         return SecondReading(by, unread="the file has a document type")
     try:
         robot = read(text)
@@ -192,7 +193,7 @@ def _own_limit(joint: Joint) -> dict[str, float] | None:
 
 
 def _rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
-    """Return yourdfpy's mimic rules of moving joints; every mimicked joint in the rules is independent."""
+    """Return yourdfpy's mimic rules of moving joints, with chains of mimic joints resolved."""
     return resolved_rules(
         {
             name: Mimic(joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
@@ -214,7 +215,7 @@ def _quaternions(text: str) -> set[str]:
 
 
 def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    """Yield a line of text for each name that the two readers find with different frequency."""
+    """Yield a line of text for each name that the two readers do not find equally often."""
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:

@@ -1,18 +1,18 @@
 """Compute singular values of Jacobians, condition numbers and manipulabilities, with guaranteed bounds.
 
-Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E|. The inequality holds
-for every norm that is at least the spectral norm; this module uses the Frobenius norm. E is the sum of two
-errors. The first error is the error of J, for which `urdfkin.verify.bounds` computes a bound. The second
-error is the residual of the decomposition, J - U S V^T.
+Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E|. The norm |E| can be
+any norm that is not smaller than the spectral norm. This module uses the Frobenius norm. The matrix E is the
+sum of two errors. The first error is the error of J, for which `urdfkin.verify.bounds` computes a bound. The
+second error is the residual of the decomposition, J - U S V^T.
 
 The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's
 theorem, each singular value of U S V^T is a singular value of S times a factor. This factor lies between (1 -
 a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
 
 The computed residuals have rounding errors too. The error of a sum of m products is at most m eps times the
-sum of the absolute values of the products. Two measures keep every intermediate value in the range of
-doubles. For a norm, all numbers are first divided by the largest number. For a product, mantissas and
-exponents are computed separately.
+sum of the absolute values of the products. No intermediate value leaves the range of doubles. To compute a
+norm, the module first divides all numbers by the largest number. To compute a product, the module handles
+mantissas and exponents separately.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class SingularValues(Displayable):
     `print` and notebooks display the singular values as a table, and explain a singularity.
 
     Attributes:
-        rows: The slice of the Jacobian's rows that is used.
+        rows: The rows of the Jacobian that are used, as a slice.
         values: (..., k) the singular values, largest first; k is the number of rows or of columns, whichever
             is smaller.
         U: (..., rows, k) left singular vectors, which are directions of the frame's velocity.
@@ -117,7 +117,7 @@ class SingularValues(Displayable):
         The explanation consists of the lost directions and the joints that cause the loss.
 
         Args:
-            sample: Indices of the configuration in the batch; no indices for a single configuration.
+            sample: Indices of the configuration in the batch. For a single configuration, give no indices.
 
         Raises:
             InputError: the wrong number of indices, or an index that does not exist.

@@ -8,7 +8,7 @@ axes, is stated only if the columns satisfy its condition within the error bound
 
 The column of a revolute joint is [a x z; z]. Here z is the direction of the axis, and the vector a leads from
 the frame's origin to a point of the axis. Therefore, two joint axes are collinear if their columns are equal
-up to sign. An axis passes through the frame's origin if the linear rows of its column are 0.
+up to sign. An axis passes through the frame's origin if the linear part of its Jacobian column is 0.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: Largest number of columns in a dependent set, and largest number of columns of a Jacobian.
-#: The search for dependent sets is limited to these numbers.
+#: The search for sets of linearly dependent columns stops at `_LARGEST_SET` columns in a set. A Jacobian with
+#: more than `_MOST_COLUMNS` columns is not searched.
 _LARGEST_SET, _MOST_COLUMNS = 4, 16
 #: Rounding error of the singular value decomposition of a small matrix, in eps for each row or column.
 _ROUNDINGS = 16.0
@@ -44,10 +44,10 @@ class FrameColumns:
         joints: (nv,) name of each column.
         turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint. None
             for a column that does not belong to a single joint axis.
-        active: (6, nv) False for numbers of the Jacobian that are 0 for every q.
+        active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
         samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: Whether the user gives the base's motion. If so, lost directions cannot be compared with
-            those of `samples`, which have a fixed base.
+        moving_base: Whether the user gives the base's motion. The lost directions of a robot on a moving base
+            cannot be compared with those of `samples`, because `samples` has a fixed base.
     """
 
     J: FloatArray
@@ -71,7 +71,7 @@ def columns_of(
     *,
     moving_base: bool,
 ) -> FrameColumns:
-    """Return the description of a Jacobian's columns.
+    """Return a Jacobian with the names of its frame and of the joints of its columns.
 
     Args:
         tree: The robot.
@@ -98,11 +98,12 @@ class Singularity(Displayable):
 
     Attributes:
         rank: Number of singular values with a lower bound above 0.
-        full: Largest possible rank, which is the number of rows or of columns, whichever is smaller.
+        full: Largest possible rank: the smaller of the number of rows and the number of columns.
         least: Upper bound on the smallest singular value.
         lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
             Jacobian has more rows than columns.
-        motions: (e, nv) null motions: joint velocities that do not move the frame.
+        motions: (e, nv) independent null motions. A null motion is a vector of joint velocities that does not
+            move the frame.
         reasons: The lost directions and their reasons, one sentence each.
 
     >>> import urdfkin
@@ -193,8 +194,8 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # If an arm has fewer joints than the Jacobian has rows, the frame cannot move in some directions in
-        # any configuration. These directions depend on the configuration.
+        # If an arm has fewer joints than the Jacobian has rows, every configuration has directions in which
+        # the frame cannot move. These directions depend on the configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -221,7 +222,7 @@ class _Explanation:
         return usual, U[:, int((s > _USUAL * s[0]).sum()) :]
 
     def _without_noise(self, rows: FloatArray) -> FloatArray:
-        """Return vectors in which numbers up to the size of the Jacobian's error are replaced by 0."""
+        """Replace the numbers that are not larger than the error of the Jacobian by 0."""
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
     def _directions(self, lost: FloatArray) -> Iterator[str]:
@@ -255,9 +256,9 @@ class _Explanation:
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
     def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield the minimal dependent sets of columns.
+        """Yield each set of linearly dependent columns that contains no smaller dependent set.
 
-        Each set consists of indices into the columns of the joints that move the frame.
+        A set contains indices of columns. Columns of joints that do not move the frame have no index.
         """
         if self._A.shape[1] > _MOST_COLUMNS:
             return
@@ -275,8 +276,8 @@ class _Explanation:
     def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         """Replace overlapping pairs of dependent columns by their union.
 
-        For example, any two columns of three parallel prismatic joints are a dependent pair. The three pairs
-        are replaced by one set of three columns.
+        For example, any two columns of three parallel prismatic joints are linearly dependent. These three
+        pairs of columns are replaced by one set of three columns.
         """
         joined: list[set[int]] = []
         if self._linear_only:
@@ -341,8 +342,8 @@ class _Explanation:
         # three linearly dependent directions lie in a plane; four directions are always dependent
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
-        # If all axes pass through one point a, each axis satisfies a x z = v.
-        # Here z is the direction of the axis, and v contains the linear rows of the joint's column.
+        # If all axes pass through one point a, each axis satisfies a x z = v. Here z is the direction of the
+        # joint axis. The vector v contains the linear velocity from the joint's Jacobian column.
         crosses = np.concatenate([_cross_matrix(-axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
@@ -351,7 +352,10 @@ class _Explanation:
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return the line that all axes intersect, if the lost direction defines such a line; else None."""
+        """Return the line that all joint axes intersect.
+
+        If the lost direction defines no such line, return None.
+        """
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -387,7 +391,7 @@ class _Explanation:
 
 
 def _sparse(rows: FloatArray) -> FloatArray:
-    """Return a sparse basis of the row space of a matrix, computed by elimination."""
+    """Return a basis of the row space with many zeros, computed by Gaussian elimination."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -401,12 +405,12 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the row space of a matrix.
+    """Return an orthonormal basis of the vector space that the rows of a matrix span.
 
-    The rows are orthogonal projections of orthonormal vectors.
+    Each row is the orthogonal projection of a unit vector.
     """
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
-    return Vt[: int((s > 0.5).sum())]  # each singular value of such rows is 1 or 0
+    return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding
 
 
 def _cross_matrix(z: FloatArray) -> FloatArray:

@@ -11,13 +11,14 @@ base b and of tip t in the world, and r = p_t - p_b:
 
 These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module implements the
 equations a second time. The check would not be independent if it used `urdfkin.kinematics.equations`, which
-computes the table's results. The bound is the sum of the rounding errors of urdfkin and of Pinocchio, plus
-the deviation that a snapped table declares.
+computes the table's results. The bound is the sum of the rounding errors of urdfkin and of Pinocchio. If the
+table was changed by snapping, the bound also includes the deviation that the table states for snapping.
 
 The bound on rounding errors is proportional to the robot's reach. Here the reach is the length of the paths
-from the root to the table's base and to its tip, with prismatic displacements. If the sum of the table's own
-lengths is larger, this sum is used, but at most `PROMISED` times the reach. Lengths in tables with Hayati
-rows never exceed that limit. The bound on a Jacobian column is multiplied by the mimic multipliers.
+from the root to the table's base and to its tip, with prismatic displacements. If the sum of all lengths in
+the table is larger than the reach, the bound uses this sum, but at most `PROMISED` times the reach. Lengths
+in tables with Hayati rows never exceed that limit. The bound on a Jacobian column is multiplied by the mimic
+multipliers.
 
 A row has only four parameters, so nearly parallel axes may need lengths of kilometres. If two such lengths
 cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference that is within this
@@ -61,18 +62,19 @@ class TableError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class TableCheck:
-    """Result of the check of a table; each number is the largest of all samples.
+    """Result of the check of a table. Each number is the largest value over all samples.
 
     Attributes:
         samples: Number of configurations.
         metres: Distance between the table's tip and Pinocchio's tip, m.
         radians: Angle between the orientations of these two tips, rad.
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
-        shares: The same differences divided by their bounds; at most 1 if the table agrees.
+        shares: Ratios of these differences to their bounds. If the table agrees with Pinocchio, no ratio is
+            above 1.
         snapped: True if the table was changed by snapping, for example from an angle of 89.99 to 90 degrees.
-            The bound then includes the deviation that the table declares.
-        loss: Explanation, if very large lengths in the table are the reason why a difference exceeds its
-            bound; else None.
+            Then the bound includes the deviation that the table states for snapping.
+        loss: Explanation of a difference above its bound if very large lengths in the table cause the
+            difference; else None.
     """
 
     samples: int
@@ -92,7 +94,7 @@ class TableCheck:
     def agrees(self) -> bool:
         """True if rounding and snapping explain the differences between table and Pinocchio.
 
-        The rounding of the table's own lengths is included.
+        Rounding includes the rounding errors of very large lengths in the table.
         """
         return self.within or self.loss is not None
 
@@ -204,7 +206,7 @@ def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, floa
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    """Return the largest ratio of a difference to its unit; 0 / 0 counts as 0."""
+    """Return the largest ratio of a number in `found` to its unit. If both are 0, the ratio is 0."""
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
@@ -245,17 +247,18 @@ def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """Sizes of the robot and of its motion, to which the bounds on rounding errors are proportional.
+    """Lengths and velocities to which the bounds on rounding errors are proportional.
 
     Attributes:
-        reach: (n,) sum of the path lengths from the root to the table's base and to its tip, m.
-        turning: (columns,) for each coordinate: the sum of |multiplier| over revolute joints. The sum
-            includes the coordinate's joint and its mimic joints, if they are on one of these paths.
-        sliding: (columns,) the same sums over prismatic joints.
-        rates: (n,) sum of all |joint velocity|, rad/s and m/s.
-        accelerations: (n,) sum of all |joint acceleration|, rad/s^2 and m/s^2.
-        rounding: (n,) upper bound on the relative rounding error. The bound also contains the angles between
-            nearly parallel axes that the table treats as parallel (`urdfkin.dh.common_normals`).
+        reach: (n,) length of the path from the root to the table's base plus length of the path from the root
+            to the table's tip, m.
+        turning: (columns,) sum of |multiplier| over revolute joints for each coordinate of the table. The sum
+            includes the coordinate's joint and the joints that mimic it, if they are on one of these paths.
+        sliding: (columns,) sum of |multiplier| over prismatic joints for each coordinate of the table.
+        rates: (n,) sum of the absolute values of all joint velocities, rad/s and m/s.
+        accelerations: (n,) sum of the absolute values of all joint accelerations, rad/s^2 and m/s^2.
+        rounding: (n,) upper bound on the relative error. A table may treat nearly parallel axes as parallel
+            (`urdfkin.dh.common_normals`). The bound includes the angles between these axes.
     """
 
     reach: FloatArray
@@ -266,15 +269,15 @@ class Sizes:
     rounding: FloatArray
 
     def of_length(self, metres: float) -> Sizes:
-        """Return the same sizes with a reach of at least `metres`."""
+        """Return a copy in which `reach` is at least `metres`."""
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
 def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
-    """Return the sizes that the bounds need.
+    """Return the lengths and velocities to which the bounds are proportional.
 
-    They are for the paths from the root to base and tip, because Pinocchio computes both frames from the
-    root.
+    The lengths are those of the paths from the root to the table's base and tip, because Pinocchio computes
+    both frames from the root.
     """
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
@@ -301,9 +304,9 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # Rounding errors come from Pinocchio's joints, the joints of the chain, and the rows of the table. A term
-    # of the relative acceleration is a product with up to four rotated vectors. `Joint.tilt`, the angle
-    # between a joint's axes in urdfkin and in Pinocchio, changes each of these vectors.
+    # Each joint on the two paths and each row of the table adds rounding errors. `Joint.tilt` is the angle
+    # between the axis of a joint in urdfkin and in Pinocchio. The factor is 4, because a term of the relative
+    # acceleration is a product of up to four rotated vectors.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
@@ -329,5 +332,5 @@ class _Slack:
 
 
 def _split(six: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest linear and the largest angular component of (n, 6)."""
+    """Return two arrays (n,): the largest linear number and the largest angular number of each row."""
     return six[:, :3].max(axis=-1), six[:, 3:].max(axis=-1)

@@ -3,8 +3,8 @@
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
 the conversion from the stage to the tree. Therefore `load` makes two comparisons:
 
-- with OpenUSD's own parser of UsdPhysics. The bodies, frames, degrees of freedom and limits of each joint
-  must be the same. A difference is an error.
+- with OpenUSD's own parser of UsdPhysics. Both parsers must find the same bodies, frames, degrees of freedom
+  and limits for each joint. A difference is an error.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
   robot in one configuration. In this configuration, each link must have the placement of its prim. The file
   states these transforms separately from the joint frames, so a difference is a warning about the file.
@@ -53,23 +53,25 @@ PATIENCE = 60.0
 #: Largest accepted size of the process's output, bytes.
 _MOST = 400_000_000
 #: Bound on the angle error (rad) of a joint's rotation in OpenUSD's parser, divided by `SINGLE`. `SINGLE` is
-#: the relative error of one rounding to single precision. Rounding the four numbers of a quaternion changes
-#: its angle by at most 2 `SINGLE`. The product of two quaternions adds an error of 4 `SINGLE` to each of the
-#: four numbers. These four errors form a vector of length 8 `SINGLE`. The angle error is twice this length:
-#: 16 `SINGLE`.
+#: the relative error of one rounding to single precision. If the four numbers of a quaternion are rounded,
+#: the rotation angle changes by at most 2 `SINGLE`. The product of two quaternions adds an error of 4
+#: `SINGLE` to each of the four numbers. The vector of these four errors has the length 8 `SINGLE`. The angle
+#: error is twice this length, that is, 16 `SINGLE`.
 _ROTATION = 18.0
-#: Number of roundings in the computation of a joint's origin. The scale factor, its product with the origin,
-#: and the transformed origin are rounded.
+#: Number of roundings in the computation of a joint's origin. The scale factor is rounded. Its product with
+#: the origin is rounded. The transformed origin is rounded.
 _ORIGIN = 3.0
-#: Bound on the angle error (rad) of one operation of a prim's transform, divided by u = `SINGLE`.
-#: Angles: up to three rotations, each of at most one turn, so each is off by at most 2 pi u, and errors add.
-#: Quaternion: the errors of its numbers form a vector of length u at most. The part across the quaternion
-#: turns by 2 u at most. The part along it changes its length by u; UsdGeom does not normalize it, so that a
-#: rotation by t is off by 2 u sin t at most. Together 4 u.
-#: Matrix: the errors of its nine numbers form a vector of length sqrt(3) u at most, and removing the scales
-#: of the rows makes it no longer. A rotation by a small angle t changes the matrix by a vector of length
-#: sqrt(2) t, so the rotation is off by at most sqrt(3/2) u.
-#: The largest of the three is the bound. `_at_rest` counts one operation for each joint on the path.
+#: Bound on the angle error (rad) of one operation of a prim's transform, divided by u = `SINGLE`. A rotation
+#: from angles consists of at most three rotations of at most one turn. The error of each is at most 2 pi u,
+#: so their sum is at most 6 pi u. A quaternion has four rounded numbers. Their errors form a vector whose
+#: length is at most u. The component of this vector perpendicular to the quaternion changes the rotation by
+#: at most 2 u. The component parallel to the quaternion changes the length of the quaternion by at most u.
+#: UsdGeom does not normalize a quaternion. Therefore, this component changes a rotation by the angle t by at
+#: most 2 u sin t. The sum of both changes is at most 4 u. A matrix has nine rounded numbers. Their errors
+#: form a vector whose length is at most sqrt(3) u. Normalizing the rows does not make this vector longer. A
+#: rotation by a small angle t changes the matrix by a vector of length sqrt(2) t. Therefore, the error of the
+#: rotation is at most sqrt(3/2) u. The bound is the largest of these three values. `_at_rest` counts one
+#: operation for each joint on the path.
 _TRANSFORM = 6.0 * np.pi
 
 
@@ -155,7 +157,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
         read: The result of `read_usd`.
 
     Returns:
-        A line of text about the result, for the certificate; and remarks about prims whose placements differ.
+        Two values: a sentence for the certificate, and remarks about prims whose placements differ.
 
     Raises:
         OracleError: OpenUSD's parser reads another joint.
@@ -171,7 +173,10 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
 
 
 def _demand(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
-    """Compare both readings of a joint; return the largest ratio of a difference to its bound."""
+    """Compare urdfkin's and OpenUSD's data of a joint.
+
+    Return the largest ratio of a difference to its bound.
+    """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
     if ours[:3] != theirs[:3]:
@@ -207,8 +212,8 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint name: five numbers for the effect of rounding to single precision (see
-#: `urdfkin.urdf.usd.Usd.single`).
+#: Mapping from the name of a joint to five numbers. The numbers describe the effect of rounding to single
+#: precision (see `urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -219,9 +224,10 @@ class SinglePrecision:
     Attributes:
         links: (links, 2) largest position error (m) and angle error (rad) of each link, over all
             configurations.
-        joints: (joints, 3) for each joint in the zero configuration: largest position error (m) and angle
-            error (rad) of the next frame relative to the previous frame. The third number is the relative
-            error of the numbers in the joint's mimic rule.
+        joints: (joints, 3) three errors for each joint in the zero configuration. The first two are the
+            largest position error (m) and angle error (rad) of the child link's frame relative to the parent
+            link's frame. The third is the relative error of the multiplier and the offset in the joint's
+            mimic rule.
     """
 
     links: FloatArray
@@ -239,19 +245,18 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     m q + c is 2^-24 (|m q| + |c|), for the largest |q| within the limits.
 
     A stage states the pose A of a joint's frame in one body and its pose B in the other body. In the zero
-    configuration, the pose of the next frame is A B^-1. Let p be the origin of B. Let w be the sum of the
-    position errors of A and B, and let e be the sum of their angle errors. The angle error of A B^-1 is at
-    most e. Its position error is at most w + e |p|. For a revolute joint, the term e |p| is 0. If p is not
-    zero, urdfkin writes B as a separate fixed joint after the revolute joint. That fixed joint is not in
-    `single`, because the numbers of the revolute joint include the errors of B. For other joints, the last
-    number in `single` is |p|. A locked prismatic joint also displaces the next frame by its value q. The
-    absolute value of q is at most the length of the joint's constant offset plus the lengths of the two
-    origins.
+    configuration, the pose of the second body relative to the first body is A B^-1. Let p be the origin of B.
+    Let w be the sum of the position errors of the poses A and B. Let e be the sum of the angle errors of A
+    and B. The angle error of A B^-1 is at most e. The position error of A B^-1 is at most w + e |p|. For a
+    revolute joint, the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
+    the revolute joint. `single` has no entry for this fixed joint, because the entry of the revolute joint
+    includes the errors of B. For all other joints, `single` contains |p| as the last of five numbers. A
+    locked prismatic joint also displaces the child link by its value q. The absolute value of q is at most
+    the length of the joint's constant offset plus the lengths of the two origins.
 
     Args:
         tree: The robot.
-        single: Five numbers for each joint. The numbers of a joint that is not in `single` have no rounding
-            error.
+        single: Five numbers for each joint. A joint without an entry in `single` has no rounding errors.
     """
     out, own = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
@@ -273,7 +278,7 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
 
 
 def _largest(joint: Joint) -> float:
-    """Return the largest size of a joint's coordinate (rad or m) within its limits."""
+    """Return the largest absolute value (rad or m) that a joint's limits allow."""
     return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
 
 
@@ -316,7 +321,7 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
     if remarks:
         words = f"by UsdGeom's transforms {len(remarks)} of the {len(prims)} prims are elsewhere, by up to"
         words = f"{words} {worst[0]:.3g} m"
-        # if several bodies of a chain differ, the first of these bodies is the cause
+        # an error of one body moves all bodies after it, so only the first is reported
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

@@ -31,7 +31,7 @@ TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
-    """Read a request from standard input and write the answer to standard output."""
+    """Read a request (JSON) from standard input, and write the answer (JSON) to standard output."""
     request = json.load(sys.stdin)
     os.environ["PXR_WORK_THREAD_LIMIT"] = "1"  # a confined process cannot start threads
     try:
@@ -84,7 +84,7 @@ def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _second_reading(read: Usd) -> dict[str, Any]:
-    """Return urdfkin's and OpenUSD's readings of each joint of the tree, by the path of the joint's prim."""
+    """Return urdfkin's and OpenUSD's data of each joint. The keys are the paths of the joints' prims."""
     pxr = library()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange

@@ -57,9 +57,9 @@ Verify = bool | Literal["sample"]
 #: Number of configurations of a call that `verify="sample"` checks.
 SAMPLE = 100
 
-#: Largest number of values, and of configurations, that are compared at a time.
-#: The number is large enough for efficient array expressions and fits into the processor's cache.
-#: The number also limits the memory for large batches.
+#: A large batch is compared in parts, which limits the memory. `_AT_A_TIME` is the largest number of values
+#: in a part. `_MOST` is the largest number of configurations in a part. A part is large enough for efficient
+#: array expressions, and it fits into the processor's cache.
 _AT_A_TIME = 262_144
 _MOST = 4096
 
@@ -84,12 +84,12 @@ class Verifier:
         policy: Default of `verify` in calls.
         mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
         unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
-        oracle: The oracle that checks the results of methods, "pinocchio" or "mujoco". Tables, the accuracy
-            study and enclosures always use Pinocchio.
+        oracle: Name of the oracle that checks the results of the robot's methods: "pinocchio" or "mujoco".
+            Tables, the accuracy study and enclosures always use Pinocchio.
 
     Attributes:
         ledger: Record of checked and unchecked results.
-        reading: If the text was converted from another format, the result of the check of this conversion.
+        reading: Result of the check of the conversion to URDF, if the robot was read from another format.
             Empty for a URDF.
     """
 
@@ -113,7 +113,7 @@ class Verifier:
 
     def __getstate__(self) -> dict[str, Any]:
         # Pinocchio's models are rebuilt when needed. A copy of a verifier has not yet checked any results, so
-        # the copy begins with an empty record.
+        # the copy gets a new, empty ledger.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
@@ -189,7 +189,10 @@ class Verifier:
         return self._refusals.get(by.name)
 
     def wanted(self, verify: Verify | None) -> Verify:
-        """Return the value of `verify` that a call uses; for None, that is the robot's policy."""
+        """Return the value of `verify` for a call.
+
+        If `verify` is None, return the robot's default `policy`.
+        """
         return checked_choice(self.policy if verify is None else verify)
 
     def ready(self, verify: Verify | None) -> None:
@@ -265,7 +268,8 @@ class Verifier:
 
         Args:
             name: Name of a quantity.
-            compute: Function of the inputs and `out` for one configuration; None for unsupported arguments.
+            compute: Function that computes one configuration from the inputs and writes the result to `out`;
+                None if the arguments are not supported.
             plan: The compiled tree of the frame.
             frame: Name of the frame, as the user gave it.
             reference: Reference frame of the results.
@@ -301,7 +305,7 @@ class Verifier:
     ) -> tuple[Comparison, VerificationError | None]:
         """Compare some of urdfkin's results with the oracle's results.
 
-        The error for the worst result is also returned, if this result exceeds its bound.
+        If a result exceeds its bound, the function also returns an error for the worst result.
         """
         x = call.part(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
@@ -356,7 +360,7 @@ class Verifier:
             The result; None, with a warning, if Pinocchio cannot check the robot.
 
         Raises:
-            TableError: the two differ by more than the bound.
+            TableError: urdfkin and Pinocchio differ by more than the bound.
         """
         from urdfkin.verify.tables import TableError, check_table  # noqa: PLC0415
 
@@ -383,7 +387,7 @@ class Verifier:
             A line of text about the agreement; None, with a warning, if Pinocchio cannot check the robot.
 
         Raises:
-            TableError: the two differ by more than the bound.
+            TableError: urdfkin and Pinocchio differ by more than the bound.
         """
         from urdfkin.verify.tables import TableError  # noqa: PLC0415
 
@@ -460,12 +464,12 @@ def oracle_results_with_bound(
 
 
 def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
-    """Return the bound on the difference between urdfkin's and the oracle's results.
+    """Return the bound on the difference between urdfkin's results and the oracle's results.
 
-    The bound can be broadcast to the shape of the results.
+    NumPy can broadcast the bound to the shape of the results.
 
-    Lengths of paths without prismatic joints are the same in every configuration. On a fixed base, the bound
-    of a quantity that depends only on lengths is therefore computed once, for one configuration.
+    If a path contains no prismatic joint, its length is the same in every configuration. Therefore, the bound
+    on a placement or a Jacobian of a robot on a fixed base is computed only once, for one configuration.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0
@@ -485,7 +489,7 @@ def own_results(quantity: Quantity, x: Part) -> FloatArray:
 
 
 def _not_finite_is_known() -> np.errstate:
-    """Silence NumPy's warnings: a value that is not finite counts as a disagreement."""
+    """Suppress NumPy's warnings about inf and NaN, because the comparison reports these values."""
     return np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -496,7 +500,10 @@ def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Flo
 
 
 def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
-    """Yield an oracle's results in blocks of configurations; each block may overwrite the one before."""
+    """Yield an oracle's results for one block of configurations at a time.
+
+    A block may overwrite the block before it.
+    """
     assert quantity.blocks is not None
     return quantity.blocks(oracle, query)
 
@@ -519,7 +526,7 @@ def checked_choice(verify: object) -> Verify:
 
 
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
-    """Yield the indices of the configurations to check, in parts.
+    """Divide the configurations that are checked into parts. Yield the indices of each part.
 
     Args:
         verify: True or "sample".

@@ -47,7 +47,7 @@ _ENDS = np.vectorize(ends, otypes=[float, float])
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosure:
-    """Lower and upper bounds of the true values of one quantity, for each number of the result.
+    """A lower and an upper bound of the true value of each number in a result, for example in a Jacobian.
 
     Attributes:
         quantity: Name of the quantity.
@@ -67,7 +67,7 @@ class Enclosure:
     def width(self) -> FloatArray:
         """The difference `upper - lower`. The width is 0 for each number whose true value is a double.
 
-        For all other numbers, the width is at least the distance between two neighbouring doubles.
+        For all other numbers, `upper` - `lower` is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 

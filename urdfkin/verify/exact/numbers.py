@@ -1,4 +1,4 @@
-"""Compute with intervals that contain the true values, and read the exact decimals of a URDF text.
+"""Interval arithmetic, and a reader of the exact decimals of a URDF text.
 
 An interval consists of a midpoint with many digits, and a radius. The library Arb (python-flint) guarantees
 that the result of each sum, product, quotient, root, sine and cosine contains the true value. Vectors are
@@ -33,15 +33,14 @@ from urdfkin.verify.bounds import Conversion
 #: Number of digits in the accuracy study.
 #: A double has 16 digits, so fifty digits are enough to measure an error in its last digit.
 DIGITS = 50
-#: Twice the 15 decimal digits of a double.
+#: A double has 15 decimal digits. This constant is twice as large.
 _TWO_DOUBLES = 30
-#: Number of bits for each decimal digit, and number of additional bits. Intervals are computed with a
-#: midpoint and a radius. With 53 bits for the midpoint, an interval can be four times as wide as an interval
-#: between two doubles. For 15 digits, which is the precision of a double, 55 bits are therefore used instead
-#: of 53.
+#: A decimal digit needs `_BITS` bits. Intervals are computed with `_MORE_BITS` additional bits. Arb stores an
+#: interval as a midpoint and a radius. A midpoint of 53 bits can make the interval four times as wide as the
+#: distance between two doubles. Therefore, 55 bits are used for 15 digits, the precision of a double.
 _BITS, _MORE_BITS = math.log2(10.0), 5
-#: Number of significant digits of a written decimal: 17 digits determine every double. `_ALL_DIGITS` is the
-#: number of digits with which `decimal` computes a decimal before it is rounded.
+#: Number of significant digits of a written decimal: 17 digits determine every double. The module `decimal`
+#: computes with `_ALL_DIGITS` digits before a decimal is rounded.
 _SIGNIFICANT, _ALL_DIGITS = 17, 200
 #: Additional bits of precision during iterations.
 _SPARE = 30
@@ -50,9 +49,9 @@ _ONE_THREAD = lock_over_forks()
 
 
 def enough_digits(joints: int) -> int:
-    """Return a sufficient number of digits, so that intervals are narrower than the last digit of a double.
+    """Return a number of digits for which intervals are narrower than the last digit of a double.
 
-    The number contains one digit for each joint before the frame. A joint with an oblique axis makes
+    The function adds one digit for each joint on the path to the frame. A joint with an oblique axis makes
     intervals wider by a third of a digit.
     """
     return _TWO_DOUBLES + joints
@@ -79,7 +78,7 @@ def exact(value: Number) -> Number:
 
 
 def ends(x: Number) -> tuple[float, float]:
-    """Return the ends of an interval or an integer, rounded outward to doubles."""
+    """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
     if isinstance(x, int):  # for a large robot, most numbers are zeros
         return float(x), float(x)
     return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
@@ -122,8 +121,8 @@ class Kind(NamedTuple):
     """Functions for one type of number, for example intervals (`BALLS`).
 
     Attributes:
-        number: Function that converts a decimal in the URDF text, or a locked joint's value (a double), to a
-            number.
+        number: Function that converts a value to this type of number. The value is a decimal in the URDF
+            text, or the double to which a joint is locked.
         sine_cosine: Function that returns sine and cosine of an angle.
         root: Function that returns the square root.
     """
@@ -173,7 +172,7 @@ def from_quaternion(quaternion: Sequence[Number], kind: Kind = BALLS) -> Matrix:
 def nearest_rotation(M: Matrix) -> Matrix:
     """Return the rotation nearest to M, which must be nearly a rotation.
 
-    The nearest rotation is the orthogonal factor U of M = U H.
+    In the polar decomposition M = U H, the orthogonal factor U is the rotation nearest to M.
 
     Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
     (1 + E) has the same orthogonal factor U. X^T X - 1 = 2 E + E^2. The eigenvalues of E are above -1, so |E|
@@ -228,7 +227,7 @@ def read_exact(
     Args:
         text: The URDF text.
         tree: The tree of the same text. If the tree has a `root_joint`, this joint is not in the text.
-        among: Indices of the joints to read; None: all.
+        among: Indices of the joints whose numbers are read; None: all joints.
         kind: Functions for the type of the numbers.
 
     Raises:
@@ -307,13 +306,13 @@ class _Text:
         return self.quaternions and origin is not None and "quat_xyzw" in origin.attrib
 
     def rotation(self, origin: Element | None) -> Matrix:
-        """Return the rotation of `rpy` or, from URDF 1.1 on, of the quaternion `quat_xyzw` of any length."""
+        """Return the rotation of an origin, from its attribute `rpy` or, since URDF 1.1, `quat_xyzw`."""
         if origin is not None and self.has_quaternion(origin):
             return from_quaternion(self.numbers(origin, "quat_xyzw", ""), self.kind)
         return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.kind)
 
     def rule(self, name: str) -> tuple[Number, Number]:
-        """Return the multiplier and the offset of a mimic joint relative to its independent joint."""
+        """Return M and C of a joint with the value M q + C, where q is the value of the independent joint."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -349,9 +348,9 @@ class _Text:
         return Conversion(angles, rules, np.array(lengths))
 
     def value(self, name: str, at: Mapping[str, Any]) -> _Value:
-        """Return the absolute value and the error of a joint's coordinate.
+        """Return bounds on a joint's coordinate and on the rounding error of this coordinate.
 
-        `at` contains the independent joints' values.
+        `at` contains the values of the independent joints.
         """
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
@@ -363,13 +362,12 @@ class _Text:
 
 
 class _Value(NamedTuple):
-    """The absolute value of a joint's value M q + C, and its error.
+    """Upper bounds on a joint's value M q + C and on the rounding error of this value.
 
     Attributes:
         moved: |M q|.
-        offset: Sum of the absolute values of the terms of C; at least |C|. C has one term for each mimic
-            rule.
-        error: Error of the value if the rules are applied one by one, in eps.
+        offset: Sum of the absolute values of the terms of C. C has one term for each mimic rule.
+        error: Rounding error of the value, in eps, if a program applies the rules one after the other.
         rules: Number of rules.
     """
 

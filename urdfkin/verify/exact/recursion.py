@@ -39,11 +39,11 @@ _FREE_AXES = {
 
 
 def on_base(base: BaseNumbers) -> State:
-    """Return the state of a moving root link from the numbers of the base's motion.
+    """Convert the base's motion to the state of the root link in the recursion.
 
     Args:
-        base: (4, 4) placement, (6,) velocity and acceleration. The rotation matrix of the placement is
-            correct to nine digits. The nearest exact rotation replaces it.
+        base: Placement (4, 4), velocity (6,) and acceleration (6,) of the base. The rotation matrix of the
+            placement is correct to nine digits. The nearest exact rotation replaces it.
     """
 
     def vector(x: FloatArray) -> Vector:
@@ -78,7 +78,7 @@ def move(
     *,
     base: State | None = None,
 ) -> Motion:
-    """Return the motion, in one sample, of the root link and of the child link of each joint.
+    """Return the position, velocity and acceleration of each link in one sample.
 
     Args:
         tree: The robot.
@@ -150,7 +150,8 @@ def spatial_acceleration_values(motion: Motion, link: int, reference: Reference)
     """Return the spatial acceleration (6,) of a link, [linear; angular].
 
     The linear part at the frame's origin is the classical acceleration minus w x vel. In WORLD, the linear
-    part belongs to the body's point at the world origin, so alpha x p is subtracted too.
+    part is the acceleration of the body's point at the world origin. Therefore, the function also subtracts
+    alpha x p.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
