@@ -2,38 +2,41 @@
 
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
 pose H are those of the zero configuration, in one common frame. This product does not contain the links
-between the joints, so links that are fixed to each other may be merged or split. Any body may be the root. A
-path from another body passes some joints backwards, and the screws of these joints are reversed.
+between the joints, so links that are fixed to each other may be merged or split. Any body may be the root. If
+the path from the root leads through a joint from its child link to its parent link, the joint's screw is
+reversed.
 
-The coordinates of a planar or floating joint describe a pose P. The frame of B's joint, or the frame of the
-body after this joint, may differ from A's. In this case, the motions of A and B are equal if
+The coordinates of a planar or floating joint describe a pose P. A and B may define the joint's frame
+differently, and also the frame of the body after the joint. With constant rigid motions M and N for these two
+differences, A and B move in the same way if
 
     P_b = M P_a N,      or M P_a^-1 N if the joint is reversed in one model.
 
-For a floating joint, any rigid M and N are valid. For a planar joint, M P N must be in the plane for every P
-in the plane. Therefore, N lowers the plane by the same distance by which M raises it. M and N both turn the
-plane over, or neither of them does.
+For a floating joint, M and N may be any rigid motions. A planar joint reaches only planar poses: translations
+and rotations in its plane. Therefore, M P N must be a planar pose for every planar pose P. If M raises the
+plane by some distance, N must lower it by the same distance. If M turns the plane over, N must turn it over
+too.
 
 **Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
-body of A to the corresponding body of B, both in the zero configuration. A joint of A moves by exp(S t), and
-the matched joint of B moves by exp(S' t'). B's coordinate may have the opposite sense (sign) and a different
-zero. Therefore, S' and t' are expressed with the sense and the zero offset of A's joint. G stays the same
-from body to body where the models agree. G changes at a joint if the joint's axis, or the body after the
-joint, has different poses in A
-and B. Therefore, B is the same as A, with two exceptions: some axes are different, and a rigid motion L is
-inserted before some joints:
+body of A to the corresponding body of B, both in the zero configuration. A joint of A with the screw S and
+the value t moves the bodies after it by exp(S t). The matched joint of B moves them by exp(S' t'). B's joint
+may have the opposite positive direction and another zero, so S' and t' are first converted to the direction
+and the zero of A's joint. If the axis of a joint and the body after it have the same poses in A and B, then G
+is the same before and after this joint. If their poses differ, a constant rigid motion L describes the change
+of G. Therefore, B's link poses are those of A with two changes. Some joints have another axis, and a motion L
+comes before some joints:
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
-If A and B agree at joint i, then S'_i = S_i, t'_i = t_i and L_i = 1. The two models have the same motion if
-and only if nothing differs. There is one exception: two revolute joints on a common line can divide the sum
-of their rotations differently.
+If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree
+everywhere, the two models have the same motion. If they differ somewhere, their motions differ, with one
+exception. If two revolute joints have the same line as axis, only the sum of their two angles matters for the
+links after them.
 
-**Variables.** The joint values of A and of B are linear functions of shared variables. Each coordinate of A
-is a variable. The senses and zero offsets of the joints convert these variables to the coordinates of B. Each
-joint value of A or B is therefore a constant plus a multiple of one variable. If a joint can move
-independently only in B, its coordinate is a separate variable. Examples are a joint that is a mimic joint in
-A, and a joint that is fixed in A.
+**Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
+is a variable. A coordinate of B is plus or minus a variable, plus a zero offset. If a joint can move
+independently only in B, its coordinate is one more variable. For example, the joint may be a mimic joint or a
+fixed joint in A.
 """
 
 from __future__ import annotations
@@ -73,9 +76,10 @@ def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
-    The motion tilts the axis about the first joint's origin and then shifts it perpendicular to itself. The
-    motion contains no rotation about the axis and no shift along the axis. Such a motion changes only the
-    joint's zero, or has no effect. The axis of a prismatic joint has no position, so its shift is 0.
+    The motion first rotates the axis about the first joint's origin to the direction of the second axis. Then
+    it shifts the axis sideways. A rotation about the axis or a shift along it would only change the joint's
+    zero, or have no effect, so the motion contains neither. The axis of a prismatic joint has only a
+    direction, so its shift is 0.
     """
     R, tilt = shortest_turn(start.direction, end.direction)
     across = np.zeros(3)
@@ -105,7 +109,7 @@ def apart(T: FloatArray, other: FloatArray) -> tuple[float, float]:
 
 
 def turn_about(u: FloatArray, R: FloatArray) -> float:
-    """Return the angle of the rotation about u that is nearest to R."""
+    """Return the angle (rad) for which a rotation about u is nearest to the rotation R."""
     vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return math.atan2(float(u @ vector), float(np.trace(R) - u @ R @ u))
 
@@ -120,7 +124,7 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 
 #: Relative tolerance for the entries of a computed pose.
 NEARLY = 1e-9
-#: A generic pose (x, y, angle) of a planar joint, which is translated along x and y and is rotated.
+#: A pose (x, y, angle) of a planar joint for tests. None of the three coordinates (m, m, rad) is 0.
 _AWAY = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
@@ -129,7 +133,7 @@ _Z = np.array([0.0, 0.0, 1.0])
 class JointTransform:
     """The conversion of a planar or floating joint: P_b = before P_a behind.
 
-    If `back` is true, P_a is replaced by P_a^-1.
+    If `back` is true, the conversion is P_b = before P_a^-1 behind.
 
     Attributes:
         before: (4, 4) M.
@@ -149,7 +153,7 @@ class JointTransform:
     def holds_for(self, kind: JointKind) -> bool:
         """Return whether M and N are rigid motions, and M P N is a possible pose of the joint.
 
-        The function tests two poses P: the identity and a generic pose.
+        The function tests two poses P: the identity and the planar pose `_AWAY`.
         """
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
@@ -198,11 +202,11 @@ def onto_plane(P: FloatArray) -> FloatArray:
 
 
 def undoing(M: FloatArray) -> FloatArray:
-    """Return N (4, 4) for which M P N is in the plane for every P in the plane.
+    """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
 
     M must keep the direction of the plane's normal or reverse it. Then M consists of a translation along the
-    normal and a motion in the plane. If M reverses the normal, M also contains half a turn about x. N undoes
-    the translation and the half turn.
+    normal and a motion in the plane. If M reverses the normal, M also contains half a turn about x. N
+    contains the opposite translation and, if needed, the second half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -248,9 +252,10 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        parting: Indices of fixed joints that move in the other model. The links before and after such a joint
-            belong to different bodies.
-        labels: For each link, the name by which links are paired. None stands for the names in the tree.
+        parting: Indices of joints that are fixed in this model and move in the other model. The link before
+            such a fixed joint and the link after it belong to different bodies.
+        labels: The name of each link, by which links of the two models are paired. If this is None, links
+            have the names in the tree.
     """
 
     def __init__(
@@ -273,14 +278,14 @@ class Mechanism:
                 bodies[body[-1]].append(i + 1)
         self.homes, self.body_of, self.edges = homes, body, edges
         self.bodies = bodies
-        #: Lists of consecutive joints, each in an order that differs from the order in the tree.
+        #: Each entry lists consecutive joints that `in_order` put in another order, in this new order.
         self.orders: tuple[tuple[str, ...], ...] = ()
         #: For each link: length (m) of the path from the root to the link, and number of joints on it.
         self.lengths, self.depths = lengths, depths
         self._screws: dict[int, Screw] = {}
 
     def joint(self, edge: Edge) -> Joint:
-        """Return the joint of the tree that an edge represents."""
+        """Return the tree's `Joint` for an `Edge` (a joint between two bodies)."""
         return self.tree.joints[edge.joint]
 
     def screw(self, edge: Edge) -> Screw:
@@ -312,7 +317,7 @@ class Mechanism:
         return other
 
     def may_be_taken(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the joints are consecutive and this order leaves the motion unchanged."""
+        """Return whether the named joints are consecutive, and the given order results in the same motion."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         one_line = all(
@@ -330,9 +335,7 @@ class Mechanism:
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
         """For each run of consecutive joints, yield the joint orders that give the same motion."""
         run: list[Edge] = []
-        for edge in (
-            self.edges
-        ):  # the order is depth first; a sequence of joints ends at a body with several child joints
+        for edge in self.edges:  # depth first; a run of joints ends where a body has several child joints
             if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
                 run.append(edge)
                 continue
@@ -341,7 +344,7 @@ class Mechanism:
         yield self._orders(run, tolerance)
 
     def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
-        """Yield all orders of joints with the same motion.
+        """Yield all orders of the joints of `run` that give the same motion.
 
         Neighbours are exchanged if they commute. The given order comes first.
         """
@@ -392,7 +395,7 @@ class Mechanism:
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """The largest angle (rad) and distance (m) that count as rounding."""
+    """The largest angle (rad) and the largest distance (m) that rounding errors can explain."""
 
     angle: float
     way: float
@@ -403,18 +406,21 @@ class Tolerance:
 
 
 def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
-    """Return the largest difference that rounding can cause between two models of the same robot."""
+    """Return the largest angle and distance that rounding can cause between two models of the same robot."""
     k = a.rounding + b.rounding
     return Tolerance(k, k * size_of(a, b))
 
 
 def size_of(a: Mechanism, b: Mechanism) -> float:
-    """Return the length (m) that converts angles to distances in a comparison."""
+    """Return the robot's size (m). Comparisons multiply an angle by this size to obtain a distance."""
     return max(a.size, b.size, LEAST_SIZE)
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) of two axes. If `placed` is false, the distance is 0."""
+    """Return the angle (rad) and the distance (m) of two axes.
+
+    If `placed` is false, only the axes' directions matter, and the distance is 0.
+    """
     ux, uy, uz = s.direction.tolist()  # called thousands of times; plain floats are faster
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
@@ -438,15 +444,14 @@ class Step:
         a: Joint of A (index in its tree).
         b: Joint of B (index in its tree).
         kind: Kind of motion: "turns" (revolute), "prismatic", "planar" or "floating".
-        previous: Index of the step for the joint pair before this one on the path; -1 if there is none.
-        sense: +1 if the values of the two joints increase together, -1 if one value decreases while the other
-            increases.
-        offset: B's value is sense * A's value + offset, rad or m.
+        previous: Index of the step before this step on the path from the base; -1 if this is the first step.
+        sense: +1 or -1, the factor in the formula of `offset`.
+        offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) the rigid motion L that is inserted before B's joint, in A's zero configuration.
         axis: Screw of A's joint in the zero configuration. The sign of the screw describes the motion of the
             body that is farther from the base.
-        other: Screw of B's joint, with the same sign convention. If the two screws agree, `other` is the same
-            Python object as `axis`.
+        other: Screw of B's joint, with the same sign convention. If the two screws agree, `other is axis` is
+            true.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes of the two joints; for planar or floating joints, between the
             origins of their frames.
@@ -488,8 +493,8 @@ class FramePair:
         end: (4, 4) the rigid motion L that is inserted after the last joint, in A's zero configuration.
         tilt: Angle (rad) between the frame of A's link and the frame of B's link.
         shift: Distance (m) between the origins of these two frames.
-        tool: (4, 4) pose of B's link in the frame of A's link, if B's link counts as a different end-effector
-            frame on the same body.
+        tool: (4, 4) pose of B's link in the frame of A's link, if the two links are two different
+            end-effector frames on the same body. Otherwise the identity.
     """
 
     a: int
@@ -502,7 +507,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def put_right(self) -> FramePair:
-        """Return a pair that describes the difference as a different end-effector frame of B."""
+        """Return the same pair without a difference; B's link is then another end-effector frame, `tool`."""
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -519,7 +524,7 @@ class Alignment:
     Attributes:
         a: One mechanism.
         b: The other mechanism.
-        base: The link of A and the link of B from which the matcher started.
+        base: The link of A and the link of B at which the search for matching joints started.
         X: (4, 4) pose of B's root in A's root frame.
         steps: The joint pairs, ordered outwards from the base: a pair comes after all pairs between it and
             the base.
@@ -577,10 +582,7 @@ class Alignment:
 
     @property
     def gauge(self) -> Gauge:
-        """The free choices of this alignment.
-
-        They contain no order of joints, because the joints of `b` already have the chosen order.
-        """
+        """The choices that this alignment made, for example the zero offset of each joint."""
         joints = self.a.tree.joints
         return Gauge(
             (self.a.tree.links[self.base[0]], self.b.tree.links[self.base[1]]),
@@ -590,10 +592,11 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield two pairs of matched joints whose partners in B could be exchanged.
+        """Yield two matched joint pairs (a, b) and (c, d) for which (a, d) and (c, b) are possible too.
 
-        Four conditions hold. Both pairs are attached to the same body. The user did not match their joints.
-        The names of A's joints do not occur in B. Below each pair, a joint or a link differs.
+        Four conditions hold. The four joints are attached to the same body of A or B. The user did not match
+        them. The names of A's two joints do not occur in B. At each pair or below it, a joint or a link
+        differs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -613,8 +616,8 @@ class Alignment:
         for a, b in pairs:
             if (known := on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # A known frame pair on the body gives the transform from B's body to A's body in the zero
-            # configuration.
+            # Two links on these bodies are already matched, which gives the transform from B's body to A's
+            # body in the zero configuration.
             T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
             home, at = self.a.homes[a], T_a_b @ self.b.homes[b]
             tilt, shift = apart(home, at)
@@ -645,13 +648,14 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gauge:
-    """The free choices of an alignment: B's root pose, and each joint's sense and zero offset.
+    """The choices of an alignment, such as the pose of B's root and the zero offset of each joint.
 
     Attributes:
-        base: A link of A and a link of B. The matcher begins at the bodies of these links. If this is None,
-            it chooses the bodies by names.
+        base: A link of A and a link of B. The search for matching joints starts at the bodies of these two
+            links. If `base` is None, the search chooses its first bodies by link names.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: (sense, offset) of joints; the key is the name in A. For all other joints it is (1, 0.0).
+        zeros: (`sense`, `offset`) of `Step`, by the joint's name in A. A joint that is not listed has the
+            values (1, 0.0).
         conversions: For each planar or floating joint whose coordinates in A and B differ: the conversion
             from A's coordinates to B's coordinates.
         orders: Each entry lists some consecutive joints of B in their new order.
@@ -664,7 +668,7 @@ class Gauge:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: The choices for models that are compared as they are written: equal root poses, equal coordinates.
+#: The choices for a strict comparison: A and B have the same root pose, and equal coordinates for each joint.
 AS_WRITTEN = Gauge()
 
 
@@ -677,7 +681,7 @@ class Line:
     constant: float
 
     def moved(self, slope: float, constant: float) -> Line:
-        """Return this linear function, multiplied by `slope` and then increased by `constant`."""
+        """Return the linear function slope * f + constant, where f is this linear function."""
         return Line(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
@@ -689,20 +693,20 @@ class Line:
 class Pair:
     """The values of two matched joints, as functions of the variables.
 
-    Both have the sense and the zero of A's joint.
+    Both values have the positive direction and the zero of A's joint.
     """
 
     a: Line
     b: Line
-    #: (sense, offset) for the conversion to B's own coordinate, which is sense * b + offset.
+    #: The value of B's joint as B's URDF defines it: sense * b + offset.
     written: Line
-    #: Because of rounding, the two constants may differ by this value (rad or m), in addition to the rounding
-    #: error of one step.
+    #: Rounding error (rad or m) that was removed from the constant of `b`, less the rounding error of one
+    #: step.
     rounding: float = 0.0
 
     @property
     def variable(self) -> str | None:
-        """The variable that moves the joint in A and in B; None if A and B have different variables."""
+        """The variable that moves both joints; None if two different variables move them."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
@@ -710,7 +714,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variables:
-    """The joint values of all steps as functions of shared variables, and the ranges of these variables.
+    """The values of all matched joints as linear functions of some variables, and the variables' ranges.
 
     Attributes:
         pairs: The joint values of each step; None for planar and floating joints.
@@ -718,7 +722,7 @@ class Variables:
         freer_a: Indices of the steps whose joint is independent in A and a mimic joint in B.
         freer_b: Indices of the steps whose joint is independent in B and a mimic joint in A.
         rules: Indices of the steps with different mimic rules in A and B.
-        leaders: For each coordinate of B, by joint name: the coordinate as a linear function of a variable.
+        leaders: Each coordinate of B as a linear function of a variable, by the joint's name in B.
     """
 
     pairs: tuple[Pair | None, ...]
@@ -761,7 +765,7 @@ class _Maker:
         self.deepest = found.deepest
 
     def _leaders(self) -> dict[str, Line]:
-        """Return each coordinate of B as a linear function of a coordinate of A, or as a separate variable.
+        """Return each coordinate of B: a linear function of a coordinate of A, or a new variable.
 
         Joints that are independent in A are processed before joints that are mimic joints in A.
         """
@@ -830,10 +834,10 @@ class _Maker:
     def _alike(self, a: Line, b: Line) -> bool:
         """Return whether two linear functions differ by rounding only.
 
-        The constant of a mimic rule depends on the zeros of two joints. Each joint zero is computed from
-        poses at the end of a path. The tolerance for the constants is therefore the sum of the rounding
-        errors of all steps of the path. The slope of a mimic rule does not depend on zero offsets, so its
-        tolerance is the rounding error of one step.
+        The offset of a mimic rule depends on the zero offsets of two joints. urdfkin computes a joint's zero
+        offset from poses, in which the rounding errors of all joints before it add up. Therefore, the
+        tolerance for the constants is the sum of the rounding errors of all joints of the path. The slopes do
+        not depend on zero offsets, so their tolerance is the rounding error of one joint.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)

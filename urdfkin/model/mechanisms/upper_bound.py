@@ -1,29 +1,31 @@
 """Upper bounds on the distance between a frame's poses in two models, proven for all configurations.
 
-Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. A bound on
-distances needs only h. If a joint moves W, the new support function h' follows from h. Suppose that W rotates
-about an axis by any angle of a range. Rotate u by the negative angles; this gives a range of directions.
-h'(u) is the largest h over these directions. If W translates, h'(u) is h(u) plus the largest product of u and
-the translation. Therefore, one function of the direction describes the reach of a chain with any number of
-joints. No search over joint values is necessary.
+Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. The largest
+distance of a point of W from the origin is the maximum of h(u) over all unit vectors u. If a rotation R moves
+W, the new support function is h'(u) = h(R^T u). If a joint may rotate W by any angle of a range, h'(u) is the
+largest h(R^T u) over all these angles. If a joint translates W by a vector p, h'(u) is h(u) + u . p, with the
+p of the joint's range for which u . p is largest. urdfkin computes h joint by joint along the chain, so it
+needs no search over joint values.
 
-The values of h are stored at the points of a grid on the surface of a cube. The function h is convex, and h(s
-u) = s h(u) for s >= 0, so interpolation between grid points gives an upper bound. For a rotation, the
-directions form an arc. The arc lies in a circumscribed polygon, and h on the polygon is largest at a corner.
-The interpolation makes the bound too large at each joint. This relative error is proportional to the square
-of the distance between grid points.
+urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
+s h(u) for s >= 0, so interpolation between grid points gives an upper bound. If a joint rotates W by any
+angle of a range, the vectors R^T u form an arc. A polygon contains this arc, and the largest h in the polygon
+is at one of its corners. At each joint, the interpolation makes the bound larger. This relative error is
+proportional to the square of the distance between grid points.
 
 Recursion. Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
-position of A's frame. The motions of joint i and its L change d to
+position of A's frame. Joint i moves by e(S t) in A and by e(S' t') in B, and L is a constant rigid motion
+before B's joint. These motions change d to
 
     d' = (L - 1) e(S' t') y  +  (e(S' t') - e(S t')) y  +  (e(S t') - e(S t)) y  +  e(S t) d.
 
-If nothing differs at the joint, all terms but the last are 0. For each direction u, the maximum of u . d' is
-at most the sum of four maxima, one for each term. These maxima follow from the support functions of y and d.
-If the models differ at one joint, only the interpolation makes the bound larger than the true maximum. If
-they differ at several joints, the terms may have their maxima in different configurations, which makes the
-bound larger still. If only fixed offsets differ, there is a second bound without interpolation: a sum of
-lengths.
+If joint i is the same in A and B, the first three terms are 0. For each direction u, the maximum of u . d' is
+at most the sum of the maxima of these four terms. urdfkin computes the maxima from the support functions of y
+and d. If A and B differ at one joint only, the bound exceeds the true maximum only because of the
+interpolation. If A and B differ at several joints, the terms of these joints may be largest in different
+configurations. In this case, the bound exceeds the true maximum for this reason too. If A and B differ only
+in constant motions L, urdfkin also computes a second bound without interpolation. The second bound is the sum
+of the distances by which each L can move the frame.
 """
 
 from __future__ import annotations
@@ -49,18 +51,18 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi
-#: Number of corners of the polygon around a circle. The distance of a corner from the centre is 0.1 % larger
-#: than the circle's radius.
+#: Number of corners of a regular polygon that contains a circle. The polygon's corners are 0.1 % farther from
+#: the centre than the circle.
 _AROUND = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Directions on the surface of a cube.
+    """A grid of points on the surface of a cube; each point stands for a direction.
 
     Attributes:
         cells: Number of cells along an edge of a face.
-        segments: A circle of directions is replaced by a circumscribed polygon with this number of sides.
+        segments: Number of sides of the polygon that replaces a full circle of directions.
     """
 
     cells: int
@@ -97,18 +99,18 @@ def _points(cells: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Support:
-    """An upper bound on the support function of a set of points, in metres.
+    """The support function (m) of a set of points, or an upper bound on it.
 
-    The bound is stored as its values at the grid points.
+    The attribute `values` contains the function's value at each grid point.
     """
 
     grid: Grid
     values: FloatArray
 
     def at(self, u: FloatArray) -> FloatArray:
-        """Return upper bounds (...) on the support function for vectors (..., 3) of any length.
+        """Return upper bounds (...) on the support function h(u) for vectors u (..., 3).
 
-        The bound for the zero vector is 0.
+        The vectors may have any length; for the zero vector, the result is 0.
         """
         cells, v = self.grid.cells, self.values
         x, y, z = u[..., 0].ravel(), u[..., 1].ravel(), u[..., 2].ravel()
@@ -143,11 +145,13 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def turned_back(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Return the support function (angles, n) at the grid points after a rotation about an axis.
+        """Return the support function's values (angles, n) at the n grid points after rotations of the set.
 
-        The grid points are rotated back by each angle.
+        The set rotates about `axis` by each of `angles` (rad). By h'(u) = h(R^T u), the method rotates the
+        grid points by the opposite angle.
 
-        The component perpendicular to the axis is multiplied by `factors`, one factor for each angle.
+        `factors` contains a factor for each angle; it multiplies the grid point's component perpendicular to
+        the axis.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -183,9 +187,10 @@ class Support:
     def largest(self) -> float:
         """Return an upper bound (m) on the distance of any point of the set from the origin.
 
-        Let g_k be the grid points of a cell. A vector u between them is a sum of c_k g_k with c_k >= 0. All
-        g_k are within an angle r of the cell's centre. Therefore, |u| is at least cos r times the sum of c_k
-        |g_k|, and h(u) / |u| is at most 1 / cos r times the largest h(g_k) / |g_k|.
+        Let g_k be the four corners of a grid cell. A vector u in the direction of a point of the cell is a
+        sum of c_k g_k with c_k >= 0. The angle between each g_k and the cell's centre is at most r.
+        Therefore, |u| is at least cos r times the sum of c_k |g_k|, and h(u) / |u| is at most 1 / cos r times
+        the largest h(g_k) / |g_k|.
         """
         share = (self.values / self.grid.lengths).max(initial=0.0)
         return float(share) / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
@@ -200,9 +205,9 @@ def point(grid: Grid, p: FloatArray) -> Support:
 
 
 def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]]:
-    """Return the corners of a polygon that contains an arc of radius 1.
+    """Return the corners of a polygon that contains the arc of the unit circle from angle `low` to `high`.
 
-    Each corner is given by its angle and its distance from the arc's centre.
+    Each corner is a pair: its angle (rad) and its distance from the circle's centre.
     """
     if high - low >= _WHOLE:
         half = math.pi / segments
@@ -215,10 +220,10 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
     return [(low, 1.0), *middles, (high, 1.0)]
 
 
-#: The two grids: a coarse grid for every frame, and a fine grid for the frame with the largest bound.
+#: The coarse grid is for the bounds of all frames. The fine grid is for a second, smaller bound of one frame.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
-#: If the range of a variable needs more sample values than this number, the values are not examined one by
-#: one.
+#: Largest number of sample values of a revolute joint's variable. If the variable's range needs more, the
+#: joint's angles in A and B are treated as independent.
 MOST_VALUES = 1024
 
 
@@ -238,7 +243,7 @@ def upper_bounds(
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
     radians = _radians(steps, pairs, variables, frame)
-    if not steps:  # no joint on the path differs: the difference is the same in every configuration
+    if not steps:  # no joint differs, so the distance is the same in every configuration
         d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
         return float(np.linalg.norm(d)), radians
     return _metres(steps, pairs, variables, frame, grid), radians
@@ -263,7 +268,8 @@ def _radians(
 ) -> float:
     """Return a bound (rad) on the angle between a frame's orientations in A and B.
 
-    The bound is the sum of the angles of all rotations that differ.
+    The bound is a sum: each joint or constant motion that differs contributes the largest angle that it
+    causes.
     """
     total = apart(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
@@ -271,7 +277,8 @@ def _radians(
         if step.kind != "turns" or pair is None:
             continue
         if step.other is not step.axis:
-            # R rotates by t, and Q tilts by s. For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
+            # Let R be the joint's rotation by an angle t, and Q the rotation by the tilt s between the two
+            # axes. For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
             total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))
         if pair.a != pair.b:
@@ -298,7 +305,7 @@ def _off(L: FloatArray, reach: float) -> float:
 
 
 def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return the support functions of d and y at the frame, after the last joint."""
+    """Return the support functions of d and y before any joint is added; d and y are then single points."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -307,9 +314,9 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Compute the support functions of d and y before a joint from those after the joint."""
-    # A planar or floating joint has no limits, so it may rotate d into any direction.
-    # The largest value of d's support function therefore holds for all directions.
+    """Add a joint to the chain: return the new support functions of d and y (module docstring)."""
+    # A planar or floating joint has no limits, so it may rotate d into any direction. Therefore, the new
+    # support function of d has the largest length of d in every direction.
     if pair is None:
         d = Support(d.grid, d.largest() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
@@ -321,7 +328,7 @@ def passed(
 
 
 def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
-    """Apply the constant rigid motion L of a step to the support functions of the vectors d and y."""
+    """Move d and y by the constant rigid motion L before B's joint, and return their support functions."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -329,7 +336,7 @@ def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
 
 
 def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Support) -> Support:
-    """Return the support function of (e(S' t') - e(S t)) y + e(S t) d, over the ranges of t and t'."""
+    """Return the support function of d after a joint, (e(S' t') - e(S t)) y + e(S t) d (module docstring)."""
     same = step.other is step.axis and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis.direction, np.zeros(3))
@@ -343,9 +350,9 @@ def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Supp
 
 
 def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
-    """Return the support function of the difference between the translations by two matched prismatic joints.
+    """Return the support function of B's translation minus A's translation, for two matched prismatic joints.
 
-    The difference is largest at the ends of the ranges.
+    The difference is largest if each joint value is at one of its limits.
     """
     if (name := pair.variable) is not None:
         ends = variables.ranges.get(name, (0.0, 0.0))
@@ -362,9 +369,10 @@ def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Gr
 
 
 def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Return sample values (n,) of a variable that moves a revolute joint both in A and in B.
+    """Return sample values (n,) of the variable that moves a revolute joint of A and its matched joint of B.
 
-    If A and B have different variables, or if the variable has no limits, the result is None.
+    The result is None if different variables move the two joints, or if more than `MOST_VALUES` samples are
+    needed. It is also None if the variable has no limits and one of the two slopes is not 0, 1 or -1.
     """
     if (name := pair.variable) is None:
         return None
@@ -379,16 +387,16 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
 
 
 def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
-    """Return the support function of the difference between two revolute joints with one variable.
+    """Return the result of `difference` for two revolute joints that are moved by the same variable.
 
-    Consider two neighbouring values of the variable, which differ by h. For all values between these two
-    values, the bound is the sum of two terms. The first term is the larger of the two bounds at the
-    neighbouring values. The second term is h^2/8 times the largest second derivative. For t' = t + c the
-    second derivative is, up to its sign, R' P' x' - R P x. Here x is the vector from the axis to y, P
-    projects perpendicular to the axis, and R' rotates about the other axis: |R' - R| <= 2 |u' - u| + |c|, |P'
-    - P| <= |u' - u|, and the perpendicular part of x' - x is the offset of the axes. Otherwise each rotation
-    has its own second derivative, multiplied by the square of the slope of t or t'. The second derivative of
-    the difference is at most the sum of these two.
+    `z` contains sample values of the variable; let h be the distance between two neighbouring samples.
+    Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
+    second derivative. If t' = t + c, the second derivative is R' P' x' - R P x, up to its sign. Here x is the
+    vector from A's axis to y, P is the projection perpendicular to A's axis, and R is the rotation about A's
+    axis. The symbols x', P' and R' belong to B's axis. With the axes' directions u and u', |R' - R| <= 2 |u'
+    - u| + |c| and |P' - P| <= |u' - u|. The perpendicular part of x' - x is the offset of the axes. If t and
+    t' have different slopes, the second derivative is at most the sum of two terms, one for each joint. Each
+    term is the square of the slope of t or t', times the largest distance of y from the joint's axis.
     """
     G = y.grid.points
     axis, other = step.axis, step.other
@@ -417,12 +425,10 @@ def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Sup
 
 
 def _independent_difference(step: Step, pair: Pair, variables: Variables, y: Support) -> Support:
-    """Return the support function of (e(S' t') - e(S t)) y for a joint whose variables are independent.
+    """Return the support function of (e(S' t') - e(S t)) y; the angles t and t' are treated as independent.
 
-    The joint has different variables in A and B, or its variable has no limits.
-
-    If A and B have the same axis, the difference is at most the chord of the largest angle between t' and t.
-    If the axes differ, the bound is the sum of the full ranges of the two rotations.
+    If A and B have the same axis, a point's two positions differ at most by the chord of the largest |t' -
+    t|. If the axes differ, the result is the sum of the support functions of e(S' t') y and -e(S t) y.
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:
