@@ -1,14 +1,13 @@
-"""Candidates for matching two mechanisms: pairs of joints, and poses and joint zeros that align joint axes.
+"""Find joints of two mechanisms that may correspond, and poses and zero offsets that align their axes.
 
 Joints at two matched bodies are paired in three ways: by the names that the user gives, by equal names, and
-by geometry. The module also computes candidates for the pose of a body and for the zero of a joint. The
-matcher tries each candidate.
+by geometry. This module also proposes poses of a body, and zero offsets of a joint. `MechanismMatcher` tries
+each proposal.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other. Each subtree follows a joint. The angle of this joint does not matter, because another zero of the
-joint can compensate for the angle. Therefore, the result depends only on the two joints, and on the
-directions and positions of their axes. Each result is computed once and then stored. The search therefore
-visits each pair of joints only a few times, even in long chains.
+the other. Each subtree begins after a joint. The angle of this joint does not matter, because it can be added
+to the joint's zero offset. Therefore, the result depends only on the two joints and their axes. The search
+stores the result for each pair of joints, so it computes few results even for long chains.
 """
 
 from __future__ import annotations
@@ -74,8 +73,8 @@ class Pairing:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
         self._named = {name for pair in given.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
-        #: Pairs of joints with the same name. They are needed for thousands of candidate poses, so they are
-        #: computed once.
+        #: Pairs of links with the same name. The dictionary stores each result, because it is needed for
+        #: thousands of poses.
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
             tuple[tuple[int, int], Via], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
@@ -95,13 +94,13 @@ class Pairing:
     def edges(
         self, bodies: tuple[int, int], via: Via, G: FloatArray, XC: FloatArray
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Match the joints that are attached to a body of A with those of a body of B.
+        """Pair the joints at a body of A with the joints at a body of B.
 
-        Return three lists: the pairs, the other joints of A, and the other joints of B.
+        Return three lists: the joint pairs, the unpaired joints of A, and the unpaired joints of B.
 
         Args:
             bodies: The body of A and the body of B.
-            via: The joints from which the matcher reached these bodies.
+            via: The joint of A and the joint of B before these bodies; None at the first bodies.
             G: (4, 4) motion that moves A's zero configuration to the current pose of B.
             XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
         """
@@ -137,7 +136,7 @@ class Pairing:
         return known
 
     def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
-        """Return whether the subtrees below two bodies have the same shape and the same kinds of joints."""
+        """Return whether the subtrees below two bodies have equal branches with equal kinds of joints."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
@@ -175,7 +174,7 @@ class Pairing:
             bodies: The body of A and the body of B.
             e: Joint of A.
             edges: Joints of B.
-            X: (4, 4) motion of B's zero configuration to A's pose.
+            X: (4, 4) rigid motion that moves B from its zero configuration to the pose of A.
         """
         one = self._geometries(self.a, bodies[0], [e], np.eye(4))
         others = self._geometries(self.b, bodies[1], edges, X)
@@ -208,9 +207,9 @@ class Pairing:
     def _geometries(
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _JointGeometry]]:
-        """Return the index and the geometry of each joint whose partner the user did not name.
+        """Return the index and the geometry of each joint, after the rigid motion T of the mechanism.
 
-        The function first applies the rigid motion T to the joints.
+        Joints whose partner the user named are omitted.
         """
         return [
             (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
@@ -219,10 +218,10 @@ class Pairing:
         ]
 
     def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
-        """Return a sort key for the difference of two joints; a larger key means a larger difference.
+        """Return a sort key, which is smaller for more similar joints.
 
-        The key compares the shapes of the subtrees first, then the distance of the axes, then the directions
-        and the origins of the joint frames.
+        Three differences decide, in this order: the branches of the subtrees, the distance of the axes, and
+        the directions and origins of the joint frames.
         """
         angle, way = one.mismatch(other)
         off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, LEAST_SIZE) + way
@@ -273,7 +272,7 @@ class _JointGeometry:
 
     @classmethod
     def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _JointGeometry:
-        """Return the geometry of a joint after the rigid motion T."""
+        """Return the geometry of a joint that is moved from its zero configuration by the rigid motion T."""
         pose = T @ mechanism.homes[edge.joint + 1]
         screw = mechanism.screw(edge).moved(T)
         return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
@@ -291,14 +290,13 @@ class _JointGeometry:
 
 def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between the axes of two joints of the same kind."""
-    if kind == "floating":  # a floating joint reaches every pose, so its frame does not matter
+    if kind == "floating":  # a floating joint reaches every pose, so any two agree
         return 0.0, 0.0
     return between_lines(s, t, placed=kind == "turns")
 
 
 _Some = TypeVar("_Some")
-#: A pair of objects of the same type. The first object belongs to mechanism A, the second object to mechanism
-#: B.
+#: Two objects of the same type: one of mechanism A and one of mechanism B.
 Both = tuple[_Some, _Some]
 
 
@@ -310,8 +308,7 @@ class Axis:
         screw: The axis as a directed line; for a prismatic joint, only the direction of the line has a
             meaning.
         turns: Whether the joint is revolute.
-        seen: A reference line. The method `height` uses the point of this line that is nearest to the joint's
-            axis.
+        seen: A reference line, usually the axis of the joint before this joint.
     """
 
     screw: Screw
@@ -323,10 +320,9 @@ class Axis:
         return Axis(self.screw.moved(T), self.turns, self.seen.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return the coordinate (m) along u of a point of the reference line.
+        """Return the coordinate (m) along u of the point of the line `seen` nearest to the joint's axis.
 
-        This point is the one nearest to the joint's axis. If the nearest point is not unique, the result is
-        None.
+        If the two lines are parallel, or if the joint is prismatic, the result is None.
         """
         s, start = self.screw, self.seen
         along_s = float(start.direction @ s.direction)
@@ -338,7 +334,7 @@ class Axis:
 
 
 def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield angles about u, or distances along u, that align the axis `theirs` with the axis `ours`."""
+    """Yield values of a joint with the axis u: angles or distances that move the axis `theirs` to `ours`."""
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -361,8 +357,7 @@ def behind(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of joint axes, one at a body of A and one at a body of B.
 
-    If a joint's axis is parallel to the line `seen`, the joint does not change the direction of that line. In
-    this case the function also yields the axes after this joint.
+    If a joint's axis is parallel to the line `seen`, `behind` also yields the axes after this joint.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
@@ -374,12 +369,11 @@ def behind(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align the first axes of A and B, and also some later axes.
+    """Yield poses of B's root that align a first joint axis of B with one of A, and also some later axes.
 
-    After the first axis is aligned, a rotation about it and a translation along it are still free. The axes
-    after the first axis determine this rotation and this translation. If no axes follow the first axis, the
-    other axes of the same body determine the rotation and the translation. An example is the body of a drone
-    with rotors.
+    After this alignment, B may still rotate about the first axis and translate along it. The function chooses
+    this rotation and this translation so that later axes coincide too. If no axes follow the first axis, it
+    uses other axes of the same body, for example the rotor axes of a drone.
     """
     firsts = _firsts((a, b), (None, None), bodies, ())
     for (ours, theirs), near, far in firsts:
@@ -402,7 +396,7 @@ def root_poses_by_siblings(
     Args:
         a: One mechanism.
         b: The other mechanism.
-        bodies: A body of A and a body of B. Each of the two bodies has several joints.
+        bodies: A body of A and a body of B. Both bodies have several joints.
         alike: Function that returns whether a joint of A may be paired with a joint of B.
     """
     edges = _with_axes(a, bodies[0])
@@ -427,7 +421,7 @@ def root_poses_by_siblings(
             more = [
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
-            if not ours[second].turns:  # such a translation does not change heights along the first axis
+            if not ours[second].turns:  # a prismatic joint has no `height`
                 carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
@@ -461,10 +455,8 @@ def _firsts(
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """Find the first revolute axes below two bodies.
 
-    Return pairs of them, with the neighbouring axes of each pair.
-
-    Each pair has an axis of A and an axis of B. If there is no revolute axis, pairs of prismatic axes are
-    returned.
+    Each result is a triple: an axis pair (one axis of A and one of B), the axis pairs before it, and the axis
+    pairs after it. If there is no revolute axis, the function returns prismatic axes.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -499,21 +491,21 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
     return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)
 
 
-#: A function for a pair of matched joints. It returns candidate poses of the child body of B's joint. Its
-#: arguments are the two child bodies, the joints, and the pose of the parent body in B.
+#: A function that proposes poses of the child body of B's joint, for a pair of matched joints. Its arguments
+#: are the two child bodies, the two joints, and the pose of the parent body in B.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Largest number of joints on a path for the recursive search. For longer paths, the matcher proceeds joint
-#: by joint.
+#: Largest number of joints on a path for the search for exact matches, which is recursive. A mechanism with a
+#: longer path is matched without this search.
 DEEPEST = 200
-#: Largest number of assignments that the search tries between the joints of two bodies.
+#: Largest number of joint pairs that the search for exact matches tries at two bodies.
 MOST_ASSIGNMENTS = 5000
 
 IDENTITY = np.eye(4)
 
-#: For each coordinate of A: the corresponding coordinate of B, and the velocity of B's coordinate divided by
-#: the velocity of A's coordinate. The ratio is negative if the two coordinates increase in opposite
-#: directions.
+#: For each coordinate of A, the name of the corresponding coordinate of B, and the ratio of their velocities
+#: (B's velocity divided by A's velocity). The ratio is negative if one coordinate increases while the other
+#: decreases.
 Rates = Mapping[str, tuple[str, float]]
 
 
@@ -550,7 +542,7 @@ class Congruence:
         self._rules = True
 
     def ignore_rules(self) -> None:
-        """Compare only the axes from now on, because the mimic rules of the two mechanisms differ."""
+        """Ignore the mimic rules in all later comparisons; only the joint axes must agree."""
         self._rules = False
         self._known.clear()
 
@@ -559,7 +551,7 @@ class Congruence:
 
         Args:
             bodies: The body of A and the body of B.
-            via: The joints through which the search reached these bodies.
+            via: The joint of A and the joint of B before these bodies; None at the first bodies.
             X: (4, 4) motion of B's body from B's zero configuration to the pose of A's body.
         """
         found = None if self._off else self._at(bodies, via, X)
@@ -603,9 +595,9 @@ class Congruence:
         tries: list[int],
         rates: Rates,
     ) -> tuple[Sequence[Pair], Rates] | None:
-        """Assign a different joint of B to each joint of A, so that the subtrees after each pair match.
+        """Pair each joint of A with a different joint of B, so that all subtrees match exactly.
 
-        If there is no such assignment, the result is None.
+        If this is impossible, the result is None.
         """
         if not left:
             return [], rates
@@ -660,10 +652,7 @@ class Congruence:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _together(self, some: Rates, others: Rates) -> Rates | None:
-        """Merge two sets of corresponding coordinates.
-
-        If the two sets contradict each other, the result is None.
-        """
+        """Merge two sets of corresponding coordinates; return None if the sets contradict each other."""
         for x, (y, rate) in others.items():
             there = some.get(x)
             if there is None:
@@ -681,7 +670,7 @@ class Congruence:
         return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
 
     def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a motion of the joint can compensate for the difference of two poses of B's body."""
+        """Return whether a motion of the joint leads from one of two poses of B's body to the other."""
         kind = self.a.joint(e).kind
         if kind.nq > 1:
             return family(kind) == "floating" or self.tolerance.holds(*apart(X, other))
@@ -697,7 +686,7 @@ class Congruence:
 
 
 def _distinct(poses: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Yield each pose once; two poses count as equal only if all their bits are equal."""
+    """Yield the poses without exact duplicates."""
     seen = set[bytes]()
     for X in poses:
         if (key := X.tobytes()) not in seen:

@@ -1,18 +1,18 @@
 """Align mechanism B with mechanism A.
 
-The alignment matches the joints of A and B. It chooses the base of B, the order of B's joints, and the sense
-and the zero of each joint. The sense is the sign of the joint's coordinate.
+An alignment pairs the joints of A with those of B. It contains the base of B, the order of B's joints, and
+the sign and the zero offset of each joint. The code calls this sign the `sense` of the joint.
 
-The matcher starts at a common body and goes outwards through A and B at the same time. At each joint it
-chooses the sense and the zero offset of B's joint. With the best choice, most of B's later links and axes
-coincide with links and axes of A. `align` calls the matcher for several starting bodies and joint orders, and
-returns the best result.
+`MechanismMatcher` starts at a body of A and the corresponding body of B. From these bodies it goes through
+both trees, joint by joint. At each joint it chooses the sign and the zero offset for which most later links
+and axes of B coincide with links and axes of A. `align` calls the matcher for several first bodies and joint
+orders, and returns the best result.
 
-Most zero offsets follow from the axes or link frames below the joint. If there are none below a joint, only a
-mimic rule can determine the zero offset. Let v = m w + c be a mimic rule of A, and let v' = m' w' + c' be the
-corresponding rule of B. The two rules are equivalent if the substitution v' = s v + o, w' = s' w + o'
-converts one rule to the other. If nothing is attached to the joint's link, the joint's offset o is free, and
-the mimic rules determine o. For a revolute joint, a multiple of a full turn may always be added to o.
+In most cases, the axes and link frames below a joint determine its zero offset. If no axes and no link frames
+are below the joint, only a mimic rule can determine the offset. Let v = m w + c be a mimic rule of A, and let
+v' = m' w' + c' be the corresponding rule of B. The two rules are equivalent if the substitution v' = s v + o,
+w' = s' w + o' converts one rule to the other. If nothing is attached to the joint's link, the two mimic rules
+determine o. For a revolute joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -57,35 +57,36 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
-#: Number of further joints that the matcher examines if the next axis does not decide between two choices.
+#: Number of further joints that the matcher compares if the next axis agrees equally well for two choices.
 AHEAD = 6
-#: The search for an exact match tries at most this number of poses of B's root. In each pose, all axes of a
-#: body of B coincide with axes of a body of A.
+#: Largest number of poses of B's root that the search for an exact match tries. In each of these poses, the
+#: axes at a body of B coincide with axes at a body of A.
 MOST_ROOT_POSES = 48
-#: If two choices have equally many agreements, one choice is better only if its largest difference is less
-#: than this fraction of the other choice's largest difference.
+#: Suppose that equally many links and axes agree for two choices. One choice is better only if its largest
+#: difference is less than this fraction of the other's largest difference.
 TWICE_AS_WELL = 0.5
 
-#: The value that the matcher chooses for a joint: an offset, or a pose for a planar or floating joint.
+#: The result that the matcher chooses for a joint: a zero offset (rad or m), or a pose for a planar or
+#: floating joint.
 _Free = TypeVar("_Free", float, FloatArray)
-#: The number of links and axes that agree, and the largest difference (m).
+#: The number of links and axes of A that agree with B, and the largest difference (m).
 Score = tuple[int, float]
 
 
 @dataclass(slots=True)
 class Ahead:
-    """The number of look-ahead steps that a search may still make. Several matchers may share this object."""
+    """The number of joint pairs that the matcher may still compare ahead. Several matchers may share it."""
 
     left: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Place:
-    """The current state of the matcher, at a body of A and the corresponding body of B.
+    """A body of A, the corresponding body of B, and the poses that the matcher has found for them.
 
     Attributes:
-        bodies: The current body of A and of B.
-        via: The joints from which the matcher reached these bodies; None at the base.
+        bodies: Index of the body of A, and index of the body of B.
+        via: The joint of A and the joint of B before these bodies; None at the base.
         previous: Index of the last step; -1 at the base.
         G: (4, 4) motion that moves A's zero configuration to the current pose of B.
         XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
@@ -105,12 +106,12 @@ class MechanismMatcher:
         a: One mechanism.
         b: The other mechanism, which is aligned with `a`.
         pairing: Finds the joints of `a` and `b` that may be matched.
-        gauge: Prescribed free choices. None: the matcher searches for the choices with the most matching
-            joints and links.
-        ahead: The number of look-ahead steps that the matcher may make.
+        gauge: Prescribed choices, for example zero offsets. If this is None, the matcher finds the choices
+            for which most joints and links agree.
+        ahead: The number of joint pairs that the matcher may compare ahead of the current joint.
         tolerance: Tolerance for the comparison of poses and axes.
-        base: A link of `a` and a link of `b`. The matcher begins at the bodies of these links. If this is
-            None, it begins at the likeliest bodies.
+        base: A link of `a` and a link of `b`. The matcher starts at the bodies of these links. If this is
+            None, the matcher starts at the bodies with most link names in common.
     """
 
     def __init__(
@@ -202,7 +203,7 @@ class MechanismMatcher:
         return any(joint.mimic is not None for m in (self.a, self.b) for joint in m.tree.joints)
 
     def _exact_beginning(self, bases: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], FloatArray] | None:
-        """Return the first pair of bodies, and the pose of B's root, with which A and B match exactly."""
+        """Return two bodies and a pose of B's root for which all of A matches all of B exactly, or None."""
         for base in bases:
             if self.pairing.same_shape(base, (None, None)):
                 for X in self._exact_places(base):
@@ -211,7 +212,7 @@ class MechanismMatcher:
         return None
 
     def _exact_places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield poses of B's root with which all axes of B's body coincide with axes of A's body."""
+        """Yield poses of B's root for which all axes at the first body of B coincide with axes of A."""
         yield from self._by_names(base)
         siblings = root_poses_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
         some = (
@@ -222,10 +223,10 @@ class MechanismMatcher:
         yield from islice(some, MOST_ROOT_POSES)
 
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield candidate poses of B's root.
+        """Yield poses of B's root that the matcher tries.
 
-        The first candidate is the pose of A's root. The next candidates align links with equal names. The
-        last candidates align axes.
+        First comes the pose of A's root. Then come poses for which two links with equal names coincide, and
+        last those for which two axes coincide.
         """
         yield from self._by_names(base)
         yield from self._by_axes(base)
@@ -241,15 +242,13 @@ class MechanismMatcher:
         return a.body_of[a.tree.link_index(link_a)], b.body_of[b.tree.link_index(link_b)]
 
     def _bases(self) -> Iterator[tuple[int, int]]:
-        """Yield pairs of bodies at which the matcher may begin, one of A and one of B.
+        """Yield pairs of bodies (one of A and one of B) at which the matcher may start.
 
-        The first body is A's root body. The partner of this body is the body of B that has most link names in
-        common with it. If no body of B has a link name in common with A's root body, every body of B is tried
-        as its partner.
-
-        If A's root body has no link names in common with B, the function also yields B's root body. The
-        partner of this body is the body of A that has most link names in common with it. A's root may have no
-        counterpart in B, for example before a floating joint.
+        The first pair is A's root body and the body of B that has most link names in common with it. If no
+        body of B has a link name in common with A's root body, A's root body is paired with every body of B.
+        Then comes one more pair: B's root body and the body of A that has most link names in common with it.
+        The last pair is needed if A's root does not exist in B, for example because a floating joint follows
+        A's root.
         """
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
@@ -306,9 +305,9 @@ class MechanismMatcher:
         return None if self.exact is None else self.exact.at(bodies, via, X)
 
     def _poses_behind(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield candidate poses of the child body of B's joint.
+        """Yield poses of the body of B after a joint, for the pose X of the body before it.
 
-        They follow from the pose of its parent body. The two matched joints are of the same kind.
+        The two matched joints are of the same kind.
         """
         there = Place(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
@@ -354,7 +353,7 @@ class MechanismMatcher:
     def _all_links(self, place: Place) -> list[tuple[int, int]]:
         """Return pairs of links with equal names, then pairs of links with equal poses.
 
-        The pairs with equal poses contain only links whose names do not exist in the other model.
+        A link is paired by its pose only if its name does not exist in the other model.
         """
         pairs = list(self.pairing.links(*place.bodies))
         taken = {j for _, j in pairs}
@@ -404,7 +403,10 @@ class MechanismMatcher:
     def _free(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, kind: str
     ) -> tuple[Step, Place, Score]:
-        """Match a planar or floating joint. Its frame and the zero of its coordinates are free choices."""
+        """Match two planar or two floating joints.
+
+        Their frames and the zeros of their coordinates may differ.
+        """
         e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
         at, seen = place.G @ homes[0], place.XC @ homes[1]
@@ -432,8 +434,8 @@ class MechanismMatcher:
             tried = self._behind(there, at, homes[1], plane, self._by_axes(there.bodies))
         places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
         N, moved, score = self._best(places, depth)
-        # P_a and P_b are the poses of the joint in A and in B, inverted if the path passes the joint
-        # backwards. Then P_b = M P_a N.
+        # Let P_a and P_b be the joint's poses in A and B. If the path leads from the joint's child to its
+        # parent, they are the inverse poses. Then P_b = M P_a N.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (IDENTITY if self.tolerance.holds(*apart(IDENTITY, T)) else T for T in pair)
         if before is IDENTITY and behind is IDENTITY and not back:
@@ -450,16 +452,16 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
-        The candidates are the identity, N in the zero configuration, and motions that align a link or an
-        axis.
+        First comes the identity (or `plane`), then the N of the zero configuration. Then come those N for
+        which a link or an axis of B coincides with one of A.
 
         Args:
-            there: The position after the joint, with B in its zero configuration.
+            there: The bodies after the joint, with B in its zero configuration.
             at: (4, 4) the joint's frame.
             home_b: (4, 4) the frame of B's joint in the zero configuration.
-            plane: (4, 4) one possible matrix N of a planar joint. All other possible matrices differ from it
-                by a motion in the plane. None for a floating joint.
-            poses_behind: (4, 4) poses that align the axes of A and B below the joint.
+            plane: (4, 4) one possible N of a planar joint. Every other possible N is the product of this N
+                and a planar pose. None for a floating joint.
+            poses_behind: (4, 4) poses of B's body after the joint for which axes of A and B coincide.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
@@ -473,9 +475,9 @@ class MechanismMatcher:
     def _like(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, *, turns: bool
     ) -> tuple[Step, Place, Score]:
-        """Match a joint that is revolute in A and B, or prismatic in A and B.
+        """Match two revolute joints or two prismatic joints.
 
-        The method chooses the sense and the zero of B's joint, and decides whether the two axes differ.
+        The method chooses the sign and the zero offset of B's joint, and decides whether the two axes differ.
         """
         e, f = _both(there.via)
         s = _outwards(self.a.screw(e), backwards[0])
@@ -495,8 +497,8 @@ class MechanismMatcher:
                 zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
-        # There are two possibilities: the joint and all bodies after it are displaced in B, or only the
-        # joint's axis differs.
+        # Either the joint and all bodies after it have another pose in B than in A, or only the joint's axis
+        # differs.
         with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
@@ -508,10 +510,7 @@ class MechanismMatcher:
         return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), *with_it[1:]
 
     def _exact_pose(self, place: Place, there: Place) -> FloatArray | None:
-        """Return the motion XC (4, 4) for an exact match of the subtrees below two joints.
-
-        Return None if there is no exact match.
-        """
+        """Return `XC` of the bodies after two joints if the subtrees below them match exactly, else None."""
         if self.exact is None:
             return None
         X = self.exact.behind(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
@@ -520,7 +519,7 @@ class MechanismMatcher:
     # -- a joint's zero ------------------------------------------------------------------------------
 
     def _prescribed(self, joint: str) -> tuple[int, float | None]:
-        """Return the prescribed sense and zero of a joint; 0 and None if sense and zero are free."""
+        """Return the sign and the zero offset that `gauge` prescribes; (0, None) without a `gauge`."""
         return (0, None) if self.gauge is None else self.gauge.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
@@ -537,12 +536,11 @@ class MechanismMatcher:
         return self._best(((offset, replace(there, G=G, XC=XC)) for offset, XC in moved), depth)
 
     def _best(self, choices: Iterable[tuple[_Free, Place]], depth: int) -> tuple[_Free, Place, Score]:
-        """Return the first choice with the most agreements.
+        """Return the choice for which most links and axes agree.
 
-        If several choices are equally good, the next `depth` joints decide.
-
-        Example: two axes that intersect at right angles can be aligned with two such axes of A in two ways. A
-            third axis decides.
+        If several choices are equally good, the method compares the next `depth` joints too. Example: two
+        axes of B intersect at right angles, and so do two axes of A. They coincide for two different poses of
+        B, so a third axis must decide.
         """
         scored = list[tuple[_Free, Place, Score]]()
         for what, place in choices:
@@ -564,7 +562,7 @@ class MechanismMatcher:
         return _best_of(seen)
 
     def _with_behind(self, place: Place, here: Score, depth: int) -> Score:
-        """Return the score of a position, including the scores of the joints after it."""
+        """Return the score for the bodies of `place` and for the next `depth` joints after them."""
         pairs = self.pairing.edges(place.bodies, place.via, place.G, place.XC)[0]
         self.ahead.left -= len(pairs)
         scores = [here, *(self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
@@ -582,7 +580,7 @@ class MechanismMatcher:
         return len(off) - len(wrong), max(wrong, default=0.0)
 
     def _offsets(self, there: Place, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
-        """Yield zero offsets of B's joint: 0, then offsets that align a link or an axis below the joint."""
+        """Yield zero offsets of B's joint: 0, then those for which links or axes after the joint coincide."""
         yield 0.0
         u = t.moved(there.XC)
         for i, j in self.pairing.links(*there.bodies):
@@ -618,7 +616,7 @@ def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
 
 
 def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place, Score]:
-    """Return the first element for which no other element is `better`."""
+    """Return the element with the best score; `better` compares the scores."""
     best = scored[0]
     for one in scored[1:]:
         best = one if better(one[2], best[2]) else best
@@ -628,9 +626,8 @@ def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place
 def better(score: Score, than: Score) -> bool:
     """Return whether `score` is better than `than`.
 
-    A score with more agreements is better. If both scores have equally many agreements, the largest
-    differences decide. Then `score` is better if its largest difference is less than half of the largest
-    difference of `than`.
+    The score with more agreeing links and axes is better. If both numbers are equal, `score` is better if its
+    largest difference is less than half of the largest difference of `than`.
     """
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
@@ -658,7 +655,7 @@ def _both(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
 
 
 def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    """Return the indices of some joints of a body and of all joints below them."""
+    """Return the indices of the joints `edges` at a body, and of all joints behind them."""
     found, stack = [], [(body, edge) for edge in edges]
     while stack:
         here, edge = stack.pop()
@@ -674,17 +671,16 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
     return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
 
 
-#: Largest number of orders that are tried for commuting joints. Five prismatic joints have this number of
-#: orders.
+#: Largest number of joint orders that are tried. For example, five prismatic joints have 120 possible orders.
 MOST_ORDERS = 120
-#: Total number of look-ahead steps of one search; this number of steps takes some seconds. Without names,
-#: TALOS needs 500 steps and Baxter 1,000.
+#: Largest number of joint pairs that one search compares ahead (`Ahead`), which takes some seconds. Without
+#: names, the robot TALOS needs 500 of them, and Baxter needs 1,000.
 MOST_AHEAD = 2000
-#: Larger tolerances that are tried when the exact match fails: an angle in rad, and a distance as a fraction
-#: of the robot's size.
+#: Larger tolerances that are tried if A and B differ. Each number is an angle in rad, and a distance divided
+#: by the robot's size.
 NEARLY = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: Largest number of times that the partners of two matched joints are exchanged on trial. Only joints with
-#: different names are exchanged.
+#: Largest number of joint-pair exchanges that are tried: (a, d) and (c, b) instead of (a, b) and (c, d). Only
+#: joints with different names are exchanged.
 MOST_EXCHANGED = 12
 
 
@@ -695,8 +691,8 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
         a: One mechanism.
         b: The other mechanism.
         given: Names of joints of A, each with the name of the matched joint in B.
-        gauge: Prescribed free choices. If this is None, the function makes the choices with which most joints
-            and links agree.
+        gauge: Prescribed choices, for example zero offsets. If this is None, the function finds the choices
+            for which most joints and links agree.
     """
     if gauge is not None:
         for taken in gauge.orders:
@@ -719,10 +715,10 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
 def _orders_to_try(
     a: Mechanism, b: Mechanism, given: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
 ) -> Iterator[Sequence[str]]:
-    """Yield other orders of commuting joints of B.
+    """Yield other orders of consecutive joints of B that give the same motion.
 
-    If A has joints with all these names, the function yields only the order in A and the reverse of this
-    order. Otherwise it yields all orders.
+    If A has joints with all these names, the only two orders are the order in A and the reverse order.
+    Otherwise all orders are tried, up to `MOST_ORDERS`.
 
     Args:
         a: One mechanism.
@@ -742,10 +738,7 @@ def _orders_to_try(
 
 
 def _by_rules(best: Alignment) -> Alignment:
-    """Compute zero offsets from the mimic rules, and align the robots again with these offsets.
-
-    Return the better of the two alignments.
-    """
+    """Return the alignment whose zero offsets fit the mimic rules, or `best` if that one is worse."""
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
@@ -755,14 +748,11 @@ def _by_rules(best: Alignment) -> Alignment:
 
 
 def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Try to exchange the partners of two joint pairs, for example of the joints in two mirrored arms.
+    """Try (a, d) and (c, b) instead of the joint pairs (a, b) and (c, d), for example in two mirrored arms.
 
-    Partners are exchanged only between joints at the same body, and only in pairs of joints with different
-    names.
+    The four joints are attached to the same body of A or B, and the joints of a pair have different names.
     """
-    if (
-        best.only_a or best.only_b
-    ):  # a joint without a partner remains, so an exchange of partners cannot make A and B equal
+    if best.only_a or best.only_b:  # some joints have no partner, so no exchange can make A and B equal
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), Ahead(MOST_AHEAD)
     while (two := next((two for two in best.exchangeable(given) if two not in tried), None)) is not None:
@@ -779,15 +769,13 @@ def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
 
 
 def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Return a much better alignment that a search with a larger tolerance finds.
+    """Search with larger tolerances for an alignment whose largest difference is less than half as large.
 
-    If there is none, the given alignment is returned.
-
-    If every axis differs slightly, no axes agree exactly, so the search cannot decide between two candidates.
-    Therefore, the search is repeated with increasing tolerances until everything agrees. Then the mechanisms
-    are aligned once more. The last alignment uses the free choices of this search, and the tolerance for
-    rounding errors. So it reports the small differences. Only tolerances between the smallest difference and
-    half of the largest difference are tried.
+    If there is no such alignment, return `best`. If all axes differ slightly, no axes agree exactly, and the
+    normal search cannot find the right choices. Therefore, this function repeats the search with larger and
+    larger tolerances, until all axes agree. Finally it aligns the mechanisms with the choices of this search,
+    but with the normal tolerance, so that the result contains the small differences. The function tries only
+    tolerances between the smallest difference and half of the largest difference.
     """
     a, b, (least, most), ahead = best.a, best.b, best.inner_off, Ahead(MOST_AHEAD)
     for angle in NEARLY:
@@ -814,35 +802,38 @@ def _best_alignment(
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
-    """Return the best alignment over all starting bodies; if `base` is given, only its bodies are used."""
+    """Return the best alignment over all first bodies; if `base` is given, only its bodies are tried."""
     tolerance = tolerance or tolerance_of(a, b)
     pairing = Pairing(a, b, given, tolerance)
     return MechanismMatcher(a, b, pairing, gauge, ahead or Ahead(0), tolerance, base).best()
 
 
-#: These numbers of full turns are tried as additions to the zero offset of a mimicked joint.
+#: Numbers of full turns that are tried as an addition to the zero offset of a revolute joint with a mimic
+#: rule.
 TURNS = (0, 1, -1)
-#: If a zero offset is computed from the positions of axes, its tolerance is the angle tolerance times this
-#: factor. The factor is large, because the offset is inexact if the axes are close together.
+#: Tolerance for a zero offset that is computed from the positions of axes, divided by the angle tolerance. It
+#: is large, because the offset is inexact if the axes are close together.
 LEVER = 1e4
 
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """A joint whose value depends on a coordinate x of A and a coordinate y of B.
+    """The mimic rules of two matched joints.
 
-    The joint's value is m x + c in A and n y + d in B. In the alignment, B's value is s times A's value plus
-    o, with the sense s and the offset o.
+    A's joint has the value m x + c, with a coordinate x of A. B's joint has the value n y + d, with a
+    coordinate y of B. In the alignment, B's value is s times A's value plus o, with the sign s and the zero
+    offset o.
 
     Attributes:
         step: Index of the step.
-        slope: The multiplier m of A's mimic rule, multiplied by the joint's sense s.
-        constant: The offset c of A's mimic rule, multiplied by the joint's sense s.
+        slope: s m, the multiplier of A's mimic rule with the sign s.
+        constant: s c, the offset of A's mimic rule with the sign s.
         n: Multiplier of B's rule.
         d: Offset of B's rule.
-        offset: The offset o that the alignment found.
+        offset: The zero offset o of B's joint in the alignment.
         turns: Whether the joint is revolute.
-        free: Whether o is free, because no axis and no common link determines it.
+        free: Whether any value of o is possible, because no axis and no link with the same name is below the
+            joint.
         meets: Whether links of A and of B coincide on the body after the joint.
     """
 
@@ -857,15 +848,15 @@ class _Rule:
     meets: bool
 
     def beta(self, turn: int) -> float:
-        """Return beta in y = alpha x + beta, if some full turns are added to the joint's zero."""
+        """Return beta of the resulting relation y = alpha x + beta, if `turn` full turns are added to o."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """Return the joint's offset o that leads to the given constant beta in y = alpha x + beta."""
+        """Return the zero offset o for which the mimic rules give y = alpha x + beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
-        """Return whether this offset is possible for the joint, up to rounding."""
+        """Return whether the joint can have this zero offset, up to rounding and (if revolute) full turns."""
         off = offset - self.offset
         if self.turns:
             off = math.remainder(off, 2.0 * math.pi)
@@ -873,7 +864,7 @@ class _Rule:
 
 
 def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Find joints of A whose zero offset follows from a mimic rule. Return their new senses and offsets."""
+    """Return (sign, new zero offset) of each joint whose offset the mimic rules determine, by A's name."""
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
@@ -925,10 +916,10 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
-    """Return two results.
+    """Return (determined, meets).
 
-    The first is True if axes, or links with equal names, determine the joint's zero offset. The second is
-    True if a link of A and a link of B below the joint coincide, also with different names.
+    `determined` is True if axes, or links with equal names, determine the joint's zero offset. `meets` is
+    True if a link of A and a link of B below the joint coincide; their names may differ.
     """
     names = set(found.a.labels) & set(found.b.labels)
     behind = {i}
