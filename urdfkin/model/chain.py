@@ -34,8 +34,8 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Smallest size (m) of a robot. A robot whose frames all coincide has this size, which avoids a division by
-#: 0.
+#: Smallest size (m) of a robot in a comparison. Without it, a robot whose frames all coincide would cause a
+#: division by 0.
 LEAST_SIZE = 1e-9
 
 
@@ -274,8 +274,8 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
             lengths.append(length)
             folded.append(count)
-            # If the path passes a joint backwards, the joint's constant pose comes after its motion.
-            # Otherwise the constant pose comes before the motion.
+            # A joint's constant pose comes before its motion. If the path leads from the joint's child to its
+            # parent, the constant pose comes after the motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0

@@ -147,7 +147,8 @@ def _narrowed(leader: Joint, own: tuple[float, float], joints: list[Joint]) -> N
 def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
     """Return the part of a mimicked joint's range in which a mimic joint is within its limits.
 
-    If there is no such part, the result is empty.
+    If the mimic joint is outside its limits in the whole range, the returned lower end is above the upper
+    end.
     """
 
     def keeps(leader: float) -> bool:
@@ -160,7 +161,7 @@ def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[f
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
-    # Move the ends inwards by the rounding error of the mimic joint's value.
+    # Make the range smaller at each end, by the rounding error of the mimic joint's value.
     room = (
         FOLLOWER * EPS * (max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)) / abs(rule.multiplier)
     )
@@ -269,10 +270,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Pinocchio may use other lengths of q and v than urdfkin.
-
-    Return an explanation for each of these lengths.
-    """
+    """Return a hint for each length that q, v or a has in Pinocchio, but not in urdfkin."""
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -477,7 +475,7 @@ def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return a line of text for each joint outside its limits in a batch `q` (..., nq).
+    """Return a message for each joint that is outside its limits in a configuration of `q` (..., nq).
 
     Mimic joints are checked too.
     """
@@ -489,8 +487,7 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
     for joint, values in zip(tree.joints, _own_values(tree, q), strict=True):
         if values is None or joint.limit is None or not values.size:
             continue
-        # A limit that is printed in decimal is rounded, so an excess of one unit in the last place is no
-        # violation.
+        # A limit in decimal is rounded, so one unit in the last place beyond the limit is allowed.
         lower, upper = np.nextafter(joint.limit.lower, -np.inf), np.nextafter(joint.limit.upper, np.inf)
         outside = np.maximum(lower - values, values - upper)
         if outside.max() > 0.0:
@@ -500,10 +497,10 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 
 
 def _degrees(joint: Joint, value: float) -> str:
-    """Return the hint "degrees?" if the value looks like degrees, else "".
+    """Return a hint to write the unit `deg` if the value looks like degrees, else an empty text.
 
-    A value looks like degrees if two conditions hold. The value is far outside the limits of a revolute joint
-    and beyond `LARGEST_ANGLE`. The value in degrees is within the limits.
+    A value of a revolute joint looks like degrees if it is beyond `LARGEST_ANGLE` and far outside the limits,
+    but would be within the limits if it were converted from degrees to radians.
     """
     if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
         return ""
@@ -513,8 +510,8 @@ def _degrees(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Number of configurations of a batch that `warn_of_degrees` examines. All configurations of a batch have the
-#: same unit, so a few of them are enough.
+#: Number of configurations of a batch in which `warn_of_degrees` looks for degrees. A few are enough, because
+#: a whole batch has the same unit.
 _LOOKED_AT = 16
 
 
@@ -539,7 +536,7 @@ def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
 
 
 def warn_of_degrees(tree: KinematicTree, q: FloatArray) -> None:
-    """Issue a `DegreesWarning` at the caller's line if values of q (..., nq) look like degrees."""
+    """Warn with `DegreesWarning` at the caller's line if values of q (..., nq) look like degrees."""
     if lines := degrees_lines(tree, q):
         more = f" ({len(lines) - 1} more joints likewise)" if len(lines) > 1 else ""
         advice = "q is in radians; numpy.radians converts degrees"

@@ -55,7 +55,8 @@ class CoordinateLayout:
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
         spans: For each joint with several numbers: the index of its first number, and how many numbers it
             has.
-        poses: Returns the named poses. `poses`, `otherwise` and `lengths` are called only when needed.
+        poses: Returns the named poses. urdfkin calls the functions `poses`, `otherwise` and `lengths` only if
+            an input needs them.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
         lengths: Returns a hint for each wrong length that users often pass, such as the length of q in
             Pinocchio.
@@ -188,7 +189,7 @@ keeps: 'neutral, elbow=...'
         return out
 
     def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
-        """Return the numbers of a joint with several coordinates, by index.
+        """Return the numbers of a joint with several coordinates: index in q, v or a, and value.
 
         Raises an error for another name.
         """
@@ -202,7 +203,7 @@ keeps: 'neutral, elbow=...'
         return {at + k: x[..., k] for k in range(size)}
 
     def _not_a_coordinate(self, name: object, where: str) -> InputError | UnknownNameError:
-        """Return the error for a name that belongs to no coordinate."""
+        """Return the exception for a name that is not a coordinate of this layout."""
         kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
         if not isinstance(name, str):
             return InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
@@ -325,7 +326,7 @@ def _cells(text: str) -> list[str]:
 
 
 def _pair(cell: str) -> tuple[str | None, str]:
-    """Split a cell at its last `=` into a name and a number; the name is None without `=`."""
+    """Split a text such as "joint_1=0.5" into the name and the number; the name is None without `=`."""
     name, equals, number = cell.rpartition("=")
     return (name.strip(), number.strip()) if equals else (None, cell)
 

@@ -1,10 +1,10 @@
 """Integrate joint velocities, and compute the joint velocities that lead from one configuration to another.
 
-`integrate` and `difference` replace + and - for configurations q that contain orientations. The two functions
-agree with Pinocchio's functions of the same names. For a joint with one coordinate they add and subtract
-numbers. For a planar or floating joint, the joint velocity (w, s) is constant in the moving frame, so the
-joint makes a screw motion: R = R_0 exp(w), p = p_0 + R_0 V(w) s, with V(w) = I + (1 - cos|w|)/|w|^2 [w] +
-(|w| - sin|w|)/|w|^3 [w]^2.
+For a configuration q with orientations, q + v is meaningless; use `integrate` and `difference` instead of +
+and -. The two functions agree with Pinocchio's functions of the same names. For a joint with one coordinate,
+`integrate` adds and `difference` subtracts. For a planar or floating joint, the joint velocity (w, s) is
+constant in the moving frame, so the joint makes a screw motion: R = R_0 exp(w), p = p_0 + R_0 V(w) s, with
+V(w) = I + (1 - cos|w|)/|w|^2 [w] + (|w| - sin|w|)/|w|^3 [w]^2.
 """
 
 from __future__ import annotations

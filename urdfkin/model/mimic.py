@@ -92,8 +92,7 @@ class Coupling:
             UnknownNameError: a name is not a coordinate of the path.
         """
         coordinates = self.checked(q, "q")
-        # The result is rounded as one multiplication and one addition for each joint, because products with
-        # the zeros of G are exact.
+        # This is G q + g, because each row of G contains only one number that is not zero.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
     def checked(self, array: Given, what: str) -> FloatArray:
@@ -141,6 +140,6 @@ class Coupling:
 
 
 def coupling_of(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
-    """Return the coupling of some joints; each joint is given as (name, mimic rule or None, kind)."""
+    """Return the `Coupling` of the joints of a path, given as (name, mimic rule or None, kind)."""
     names, mimics, kinds = zip(*joints, strict=True) if joints else ((), (), ())
     return Coupling(names, mimics, kinds)

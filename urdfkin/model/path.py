@@ -1,12 +1,11 @@
-"""The poses and the Jacobian of a path, which is a product of constant poses and elementary motions.
+"""Poses and Jacobian of a path: a product of constant poses and elementary motions, such as Rz(x) or Tx(x).
 
     T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...,      E_k = Rx, Ry, Rz, Tx, Ty or Tz of the amount x_k
 
 Chains, Denavit-Hartenberg tables, screws, and the models that `dh --compare` and `calibrate` fit have this
-form. Only the meaning of the amounts x_k differs: joint values, cells of a table, or parameters. Let p be the
-position of the path's end. The derivative of the end's pose with respect to an amount is a twist (dp/dx, w).
-Let e be the direction of the motion's axis, and O a point of this axis, both in the first frame of the path.
-The twist is
+form. The numbers x_k (rad or m) are joint values, cells of a table, or parameters. Let p be the position of
+the path's end. The derivative of the end's pose with respect to x_k is a twist (dp/dx_k, w). Let e be the
+direction of the axis of E_k, and O a point of this axis, both in the first frame of the path. The twist is
 
     rotation   dp/dx = e x (p - O),   w = e;       translation   dp/dx = e,   w = 0
 
@@ -59,7 +58,7 @@ class Path:
     steps: tuple[FloatArray | Motion, ...]
 
     def frames(self, amounts: ArrayLike) -> FloatArray:
-        """Return the poses (..., steps, 4, 4) after each step, for amounts (..., motions) in rad or m."""
+        """Return the poses (..., steps, 4, 4) after each step, for x_k (..., motions) in rad or m."""
         amounts = np.asarray(amounts, np.float64)
         frames = np.empty((*amounts.shape[:-1], len(self.steps), 4, 4))
         for i, T in enumerate(self._after_each_step(amounts)):
@@ -68,7 +67,7 @@ class Path:
 
     def _after_each_step(self, amounts: FloatArray) -> Iterator[FloatArray]:
         """Yield the poses (..., 4, 4) after each step; consecutive poses may be the same array."""
-        # An amount of zero changes nothing, and many cells of a table are zero.
+        # A motion by 0 changes nothing, and many cells of a table are 0.
         moving = np.asarray(amounts.any(axis=tuple(range(amounts.ndim - 1))))
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         k = 0
@@ -82,7 +81,7 @@ class Path:
             yield T
 
     def poses(self, amounts: ArrayLike) -> FloatArray:
-        """Return the pose (..., 4, 4) at the end of the path for amounts (..., motions)."""
+        """Return the pose (..., 4, 4) at the end of the path for the numbers x_k (..., motions), rad or m."""
         amounts = np.asarray(amounts, np.float64)
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         for T in self._after_each_step(amounts):  # noqa: B007  the last one is the result
@@ -92,12 +91,12 @@ class Path:
     def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular].
 
-        Column k is the derivative with respect to the amount x_k.
+        Column k is the derivative with respect to x_k.
         """
         return self.columns_at(self.frames(amounts))
 
     def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the same as `columns`, from the poses (..., steps, 4, 4) that `frames` returned."""
+        """Return the result of `columns`, computed from the result (..., steps, 4, 4) of `frames`."""
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, Motion)]
         # A motion does not move its own axis, so the frame after the motion also contains the axis.
@@ -124,7 +123,7 @@ def elementary(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
 
 
 def _moved(T: FloatArray, motion: Motion, amount: FloatArray) -> FloatArray:
-    """Return poses (..., 4, 4) multiplied by the elementary motion with amounts (...)."""
+    """Return the poses T (..., 4, 4), multiplied from the right by an elementary motion."""
     moved = np.array(T)
     if motion.turns:
         moved[..., :3, :3] = T[..., :3, :3] @ coordinate_rotation(motion.axis, amount)

@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: A part of q, v or a that begins with the numbers of one joint.
+#: A slice of q, v or a that starts with the numbers of one joint.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -46,7 +46,7 @@ class Column:
     Attributes:
         z: The joint's axis.
         turns: Whether the joint is revolute.
-        carrier: State of the frame that carries the joint's axis.
+        carrier: State of the frame that the joint's axis is fixed to.
         order: Position of the column's joint on the path, counted from the base.
         place: Index of the joint velocity in v.
         factor: Multiplier of the mimic rule, by which the joint velocity is multiplied.
@@ -124,9 +124,10 @@ class Recursion:
         return self._free(s, (q[0], q[1], q[2]), S, rates)
 
     def _free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
-        """Return the state after a displacement `slide` and a rotation S.
+        """Return the state after a planar or floating joint with the displacement `slide` and the rotation S.
 
-        `rates` are in the child link's axes.
+        `rates` contains the joint's linear and angular velocity, then its linear and angular acceleration.
+        All four vectors are expressed in the child link's axes.
         """
         eq, s = self.eq, self.turned(self.carried(s, slide), S)
         u, o, u_rate, o_rate = (self.seen(s, x) for x in rates)
@@ -206,8 +207,8 @@ class Recursion:
     ) -> Iterator[tuple[int, int, Number, Six]]:
         """Yield the derivative of each Jacobian column with respect to each joint coordinate.
 
-        Each item has four parts: the index of the column, the index of the joint velocity in v, a factor and
-        the derivative.
+        Each tuple contains the column's index, the coordinate's index in v, a factor, and the derivative. The
+        derivative must be multiplied by the factor, which comes from mimic rules.
         """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]
@@ -223,7 +224,7 @@ class Recursion:
             six: The Jacobian column whose derivative is returned.
             by: The Jacobian column of the joint that moves.
             reference: The reference frame.
-            before: True if the moving joint is before the joint of the column `six` on the path, or is the
+            before: Whether the moving joint comes before the joint of the column `six` on the path, or is the
                 same joint.
         """
         eq = self.eq

@@ -24,7 +24,7 @@ def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
         tree: The robot.
         base: Default base of a chain.
         tip: Default tip of a chain.
-        order: Text about the order of the joints.
+        order: A sentence that says how the joints are ordered; it is printed below the table.
     """
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]

@@ -93,7 +93,7 @@ class JointKind(Enum):
     nq: int  #: Number of coordinates of a joint of this kind in `q`.
     nv: int  #: Number of entries of a joint of this kind in `v` and `a`.
     nq_pinocchio: int  #: Number of coordinates in Pinocchio, which stores a free angle as (cos, sin).
-    has_axis: bool  #: Whether a joint of this kind has an axis about or along which it moves.
+    has_axis: bool  #: Whether a joint of this kind rotates about an axis or slides along one.
     turns: bool  #: Whether a joint of this kind rotates about its axis.
     bounded: bool  #: Whether a URDF gives such a joint a lower and an upper limit.
 
@@ -125,8 +125,8 @@ class Limit:
 #: Largest plausible joint angle, radians. The angle is more than one turn, because some industrial wrists
 #: turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
-#: A value is far outside a joint's limits if it exceeds them by more than the larger of these two amounts.
-#: The first amount is in radians or metres. The second amount is a fraction of the joint's range.
+#: A value is far outside a joint's limits if it exceeds a limit by more than the larger of two amounts:
+#: `_OUTSIDE` (rad or m), and the fraction `_OF_RANGE` of the joint's range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
@@ -201,7 +201,7 @@ class Joint:
             )
 
     def __reduce__(self) -> tuple[type[Joint], tuple[Any, ...]]:
-        # Rebuilding runs __post_init__, so that arrays are read-only after unpickling as well.
+        # Unpickling then calls the constructor, and `__post_init__` makes the arrays read-only.
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     @property
@@ -369,7 +369,7 @@ class KinematicTree:
 
     @cached_property
     def least_implausible(self) -> float:
-        """Smallest absolute value in `plausible_angles`; infinite if the robot has no such value."""
+        """Smallest absolute value in `plausible_angles`; infinite if no revolute joint has limits."""
         return float(np.abs(self.plausible_angles).min(initial=np.inf))
 
     # -- names ---------------------------------------------------------------------------------------
@@ -527,7 +527,7 @@ def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree
 
 
 def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Return the tree with named poses; values for joints without exactly one coordinate are left out."""
+    """Return the tree with named poses. Only values of joints with exactly one coordinate are stored."""
     own = {joint.name for joint in tree.joints if joint.nq == 1}
     kept = {pose: {name: x for name, x in of.items() if name in own} for pose, of in poses.items()}
     return replace(tree, poses=kept)
@@ -538,7 +538,8 @@ def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTre
 
     Args:
         tree: The robot.
-        values: Value (rad or m) of each joint to fix, by name; each has one coordinate of its own.
+        values: Value (rad or m) of each joint to fix, by name. Only a joint with exactly one coordinate can
+            be fixed.
     """
     leaders = [joint.mimic.leader if joint.mimic else joint.name for joint in tree.joints]
     joints = [

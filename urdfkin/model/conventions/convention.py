@@ -296,8 +296,8 @@ def _quoted(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: A transcoded name ends with numbers in base 62. If a digit has at least this value, the next digit belongs
-#: to the same number.
+#: `transcoded` appends numbers in base 62 to a name. A digit of 31 or more is followed by another digit of
+#: the same number; a smaller digit is the last digit of its number.
 _CONTINUES = 31
 
 
@@ -342,13 +342,11 @@ def transcoded(name: str) -> str:
 
     Different names give different results.
 
-    The result has three parts: "tn__", the allowed characters of the name with a final "_", and numbers for
-    the other characters. These numbers have digits of base 62 and are in the order of the code points. Each
-    number encodes a character and its position in the name (Bootstring encoding). It is d n + p. Here d is
-    the difference of the code point from the previous code point, n is the number of possible positions, and
-    p is
-    the position. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
-    proposals/transcoding_invalid_identifiers.
+    The result begins with "tn__". Then come the allowed characters of the name and "_". Last come numbers in
+    base 62, one for each other character, sorted by code point. As in Punycode, a number d n + p encodes a
+    character and its position p in the name. Here d is the character's code point minus that of the previous
+    number, and n is the number of possible positions. Source:
+    github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')

@@ -39,7 +39,7 @@ class _Column:
     `value` is the number at the index `at` of urdfkin's q.
 
     `part` is "cos" or "sin" for a continuous joint that the target program stores as two numbers. `copy` is
-    True for a mimic joint.
+    True if the target program's q also contains mimic joints, and this number belongs to one.
     """
 
     name: str
@@ -73,8 +73,8 @@ class Conversion:
         urdf: The URDF text of the robot. Some conventions need the order of the joints in the text, or the
             centres of mass.
         convention: The convention.
-        joints: Order of the joints. It replaces the convention's own order, and is required if the convention
-            has none.
+        joints: Order of the joints. This order replaces the order of the convention. It is required if the
+            convention has no order.
 
     Raises:
         InputError: a joint is missing or appears twice, two columns have the same name, or no order of joints
@@ -354,12 +354,12 @@ class Conversion:
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Names of the numbers of the target program's q."""
+        """The name of each number of q in the target program."""
         return tuple(column.name for column in self._columns)
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """Names of the numbers of the target program's v and a, and of the columns of its Jacobian."""
+        """The name of each number of v in the target program, and of each column of its Jacobian."""
         return tuple(self._v_names)
 
     def layout(self, what: str) -> CoordinateLayout:
@@ -376,7 +376,7 @@ class Conversion:
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `q_tool = q[..., permutation]`; None if the conversion is more than a change of order.
+        """Indices with `q_tool = q[..., permutation]`; None if the conversion also changes numbers.
 
         >>> import urdfkin
         >>> urdfkin.load("a1").convention("mujoco").permutation.tolist()
@@ -386,14 +386,14 @@ class Conversion:
 
     @property
     def is_constant(self) -> bool:
-        """Whether `matrix` is the same at every q."""
+        """Whether `matrix` is the same in every configuration."""
         return not self._blocks
 
     @property
     def rate_permutation(self) -> NDArray[np.intp] | None:
         """Indices with `v_tool = v[..., rate_permutation]`.
 
-        The value is None if the conversion is more than a change of order.
+        The value is None if the conversion also changes the numbers, for example their unit or sign.
         """
         return self._v_at.copy() if self._plain_v else None
 
@@ -660,7 +660,7 @@ class Conversion:
         return self._rows(A, -A @ _cross(block.point), unit * turn)
 
     def _rows(self, A: FloatArray, arm: FloatArray, turn: FloatArray) -> FloatArray:
-        """Return [[A, arm], [0, turn]], with the angular rows first if the target program has them first."""
+        """Return the matrix [[A, arm], [0, turn]], with its rows in the target program's order."""
         B = np.zeros((*A.shape[:-2], 6, 6))
         B[..., :3, :3], B[..., :3, 3:], B[..., 3:, 3:] = A, arm, turn
         return B if self.convention.base_v == "linear first" else B[..., _SWAPPED, :]
@@ -763,8 +763,8 @@ class Conversion:
             quantity: Name of the quantity.
             ours: q, or q and v, or q, v and a, in urdfkin's convention.
             result: The result (..., 6), (..., 6, nv) or (..., 6, nv, nv); a placement is returned unchanged.
-            jacobian: Function that returns the Jacobian (..., 6, nv). It is called to convert the Jacobian's
-                time derivative and the Hessian.
+            jacobian: Function that returns the Jacobian (..., 6, nv). `result` calls this function only if it
+                converts a time derivative of the Jacobian or a Hessian.
 
         Raises:
             InputError: urdfkin's conventions do not define a conversion of this quantity.
