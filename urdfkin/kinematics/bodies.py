@@ -10,8 +10,9 @@
 | the analytical Jacobian | 7.5 | 7.116 to 7.122 |
 
 `p_1`, `v_1` and `a_1` are position, velocity and acceleration of a point as an observer in frame 1 measures
-them, expressed in frame 1. Results are measured and expressed in frame 0. Six-vectors are [linear; angular].
-`z` is a joint's axis z_{i-1} in frame 0; `turns` is True for a rotary joint and False for a prismatic one.
+them, expressed in frame 1. Results are relative to frame 0 and expressed in frame 0. Six-vectors are [linear;
+angular]. `z` is a joint's axis z_{i-1} in frame 0; `turns` is True for a rotary joint and False for a
+prismatic one.
 
 There are two Jacobians; the textbook warns that they are often confused. The velocity Jacobian J_v gives the
 linear and the angular velocity. The manipulator (or analytical) Jacobian J gives the time derivatives of
@@ -85,8 +86,8 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     to frame 1.
 
     The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. The
-    angular velocity of frame 2 is w_01 + w_12 (7.49). The time derivative of this sum contains the term w_01
-    x w_12.
+    angular velocity of frame 2 is w_01 + w_12 (7.49). The angular acceleration is the time derivative of w_01
+    + w_12, which contains the term w_01 x w_12.
 
     Args:
         outer: Motion of frame 1 relative to frame 0.
@@ -148,7 +149,7 @@ class VelocityParts:
 
     Attributes:
         rotation: w x p, from the rotation of the frame.
-        relative: R v_1, from the velocity of the point relative to the frame.
+        relative: R v_1, the velocity of the point relative to the frame, expressed in frame 0.
         origin: d-dot, the velocity of the frame's origin.
     """
 
@@ -514,9 +515,9 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
 
-    For a quaternion, C has several right inverses. The function returns the one for which x-dot is
-    perpendicular to the quaternion, so that the quaternion's length stays constant. This right inverse has no
-    singularity.
+    For a quaternion, C has several right inverses. The function returns the right inverse for which the
+    quaternion's time derivative is perpendicular to the quaternion. The quaternion's length then stays
+    constant. This right inverse has no singularity.
 
     Args:
         representation: SciPy's name of an Euler sequence, or "quaternion".

@@ -62,7 +62,7 @@ def product(R, S):
 
 
 def about_x(sine, cosine, zero, one):
-    """Return a rotation about x; `zero` and `one` are numbers of the kind in use."""
+    """Return a rotation about x; `zero` and `one` are 0 and 1 in the number type of `sine`."""
     return (one, zero, zero), (zero, cosine, -sine), (zero, sine, cosine)
 
 
@@ -168,12 +168,12 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: rate of w + R o, if o is the joint's angular velocity and b its rate in the moving frame."""
+    """7.129: angular acceleration after a joint with angular velocity o; b is the rate of o."""
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130 for a joint's linear velocity u and its rate b, in a frame that rotates with w + o."""
+    """7.130: acceleration after a joint with linear velocity u and angular velocity o; b is the rate of u."""
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 
@@ -181,7 +181,7 @@ def free_acceleration(acc, w, o, u, b):
 
 
 def turning_column(z, d):
-    """7.80, 7.85, rotary: [z x d; z], with d from the joint's axis to the frame's origin."""
+    """7.80, 7.85: column [z x d; z] of a rotary joint; d leads from its axis to the frame's origin."""
     return cross(z, d), z
 
 
@@ -204,15 +204,15 @@ def rate_in_turning_axes(rate, w, x):
 
 
 def turned_along(w, linear, angular):
-    """Return the rate of a column of 7.85 if an earlier joint rotates its axis and its moment arm with w."""
+    """Return the rate of a Jacobian column (7.85) if an earlier joint rotates z and d with velocity w."""
     return cross(w, linear), cross(w, angular)
 
 
 def end_moved(z, linear):
-    """Return the rate of a column's rows z x d if a later joint moves the end of d with velocity `linear`."""
+    """Return the rate of z x d (7.85) if a later joint moves the frame's origin with velocity `linear`."""
     return cross(z, linear)
 
 
 def motion_product(linear_1, angular_1, linear_2, angular_2):
-    """Return the spatial cross product of two columns: the rate of the second if the first joint moves."""
+    """Return the rate of Jacobian column 2 if the joint of column 1 moves: their spatial cross product."""
     return plus(cross(angular_1, linear_2), cross(linear_1, angular_2)), cross(angular_1, angular_2)

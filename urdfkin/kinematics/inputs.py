@@ -18,9 +18,9 @@ FloatArray = NDArray[np.float64]
 #: by 4e-16 at most. A vector that is typed with six digits deviates by more. A rotation about such a vector
 #: would not be a rotation matrix.
 UNIT_TOLERANCE = 1e-12
-#: Largest deviation of R R^T from the identity for a rotation. Suppose that the entries of R are rounded to
-#: nine decimals. Each entry then has an error of 5e-10 at most. Then R R^T deviates from the identity by at
-#: most 1e-9 times the sum of the absolute values of a row. This sum is at most sqrt(3).
+#: Largest deviation of R R^T from the identity for a rotation. If the entries of R are rounded to nine
+#: decimals, each entry has an error of 5e-10 at most. R R^T then deviates by at most 1e-9 times the sum of
+#: the absolute values of a row of R. This sum is at most sqrt(3).
 ROTATION_TOLERANCE = 2e-9
 #: Kinds of NumPy types that NumPy converts to floats without an error, although they are not real numbers:
 #: complex, bytes, text, timedelta, datetime, void.
@@ -119,7 +119,7 @@ def rotation_defect(R: FloatArray) -> FloatArray:
     The result is 0 for an exact rotation. Each caller compares the result with its own tolerance, because
     matrices are written with different numbers of digits.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # a matrix whose product overflows is not a rotation
+    with np.errstate(over="ignore", invalid="ignore"):  # if R R^T overflows, R is not a rotation
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))
         return np.where((defect >= 0.0) & (determinant(R) > 0.0), defect, np.inf)
 

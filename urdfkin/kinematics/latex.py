@@ -2,8 +2,9 @@
 
 The functions of `equations` are called with LaTeX expressions instead of numbers.
 
-A `Word` is a LaTeX expression together with its outermost operation, which is a sum, a cross product or
-neither. The outermost operation decides whether the expression needs brackets inside another expression.
+A `Word` is a LaTeX expression. Its attribute `kind` says whether the expression is a sum, a cross product or
+neither. A sum needs brackets inside a product, and a cross product needs brackets inside another cross
+product.
 """
 
 from __future__ import annotations
@@ -51,13 +52,13 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class Word:
-    """A LaTeX expression; `kind` is its outermost operation."""
+    """A LaTeX expression; `kind` is `_SUM`, `_CROSS`, or `_ATOM` for any other expression."""
 
     text: str
     kind: int = _ATOM
 
     def inside(self, kind: int) -> str:
-        """Return the text, in brackets if its outermost operation is `kind` or binds less tightly."""
+        """Return the text, in brackets if it is a sum, or if it is a cross product and `kind` is `_CROSS`."""
         return f"({self.text})" if self.kind >= kind else self.text
 
     def __neg__(self) -> Word:

@@ -14,7 +14,7 @@ State = TypeVar("State")
 Seen = TypeVar("Seen")
 
 _ROUNDS = 100
-#: The initial, the smallest and the largest damping, relative to the largest singular value.
+#: Damping of a Gauss-Newton step, divided by the largest singular value: first, smallest and largest value.
 _DAMPING, _LEAST, _MOST = 1e-3, 1e-14, 1e3
 #: Two factors for the damping: one for a step that reduces the error, and one for a step that does not.
 _EASING, _HARDER = 0.03, 10.0
@@ -22,7 +22,7 @@ _EASING, _HARDER = 0.03, 10.0
 _SLOW = 0.99
 #: The iteration ends if a full step can reduce the squared error by at most this fraction.
 _NOTHING = 1e-13
-#: The rounding error of the sum of squares is at most this number times eps times the sum, for each residual.
+#: Relative rounding error of the norm of the residuals, in eps, divided by the number of residuals.
 _ROUNDED = 4.0
 
 

@@ -1,17 +1,18 @@
 """Compute upper bounds on the lengths of a link's position, velocities and accelerations.
 
-The bounds of a link follow from the bounds of its parent link.
+The functions compute the bounds of a link from the bounds of its parent link. A state contains five numbers
+for a point of a link: p for the position, w and vel for the angular and the linear velocity, and alpha and
+acc for the angular and the linear acceleration. Each number is an upper bound on the sum of the lengths of
+all terms of the quantity.
 
-A state is (p, w, vel, alpha, acc). These are upper bounds on the terms of a point's position, its angular and
-linear velocity, and its angular and linear acceleration. `urdfkin.verify.bounds` calls the functions of this
-module with NumPy arrays and with Python numbers. `urdfkin.verify.kernels` compiles the functions. All three
-variants give the same result to the last bit.
+`urdfkin.verify.bounds` calls the functions of this module with NumPy arrays and with Python numbers.
+`urdfkin.verify.kernels` compiles the functions. All three variants give the same result to the last bit.
 """
 
 from urdfkin.kinematics.number_kinds import Length
 from urdfkin.kinematics.number_kinds import length_equations as eq
 
-#: Upper bounds on p, w, vel, alpha and acc.
+#: The five bounds (p, w, vel, alpha, acc) of the module docstring.
 State = tuple[Length, ...]
 _Z = 1.0  #: Length of a joint's axis.
 
@@ -29,7 +30,7 @@ def carried(state: State, d: Length) -> State:
 
 
 def turned(state: State, d: Length, o: Length, o_rate: Length) -> State:
-    """Return the state after a revolute joint at the distance d, with joint velocity o (7.127, 7.129)."""
+    """Return the state after a revolute joint with offset length d and joint velocity o (7.127, 7.129)."""
     p, w, vel, alpha, acc = carried(state, d)
     w = eq.angular_velocity(w, _Z, o)
     return p, w, vel, eq.angular_acceleration(alpha, w, _Z, o, o_rate), acc

@@ -1,16 +1,16 @@
-"""The textbook's equations on two more kinds of number: NumPy arrays, and the lengths of vectors.
+"""The textbook's equations for NumPy arrays, and for the lengths of vectors.
 
 `array_equations` computes with NumPy arrays. The last axis of an array contains the three components of a
 vector, so one call computes a whole batch.
 
 `length_equations` computes the scale of a result, which is an upper bound on the sum of the absolute values
 of its terms. Each vector is replaced by its length or by an upper bound on its length. A difference becomes a
-sum, a cross product becomes the product of two lengths, and a rotation changes nothing. No term, no partial
-sum and no result of the equation exceeds the scale. Rounding errors are proportional to the scale. Rounding
-errors are not proportional to the result, because the result is small where large terms cancel.
+sum, a cross product becomes the product of two lengths, and a rotation changes nothing. The scale is at least
+as large as every term, every partial sum and the result. Rounding errors are proportional to the scale.
+Rounding errors are not proportional to the result, because the result is small where large terms cancel.
 
 A scale that is not zero is at least `SMALLEST`, the smallest normal number. There are two reasons. First, a
-product smaller than `SMALLEST` has an error of half the smallest subnormal number. A product of the size
+product smaller than `SMALLEST` has an error of half the smallest subnormal number. A product that is equal to
 `SMALLEST` has the same error. Second, a product of two small numbers may underflow to zero, and a later
 operation may multiply it by a large number.
 """
@@ -74,8 +74,8 @@ def norm(x: FloatArray) -> FloatArray:
     return counted(np.hypot.reduce(x, axis=-1))
 
 
-#: The equations on lengths. Each number or vector is replaced by its absolute value or length, as Python's
-#: number or as an array; arrays broadcast. A unit vector has length 1.
+#: The equations with lengths: a vector is replaced by its length, and a number by its absolute value. Each
+#: length is a Python number or an array; arrays broadcast. A unit vector has length 1.
 length_equations = bound(
     plus=add,
     minus=add,

@@ -126,8 +126,8 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: If no entry of a matrix differs from the same entry of the nearest rotation by more than this number, the
-#: matrix is a rotation up to rounding and is not changed.
+#: A matrix is not changed if all its entries differ from those of the nearest rotation by this number at
+#: most. It is then a rotation up to rounding.
 ROUNDED = 1e-15
 
 
@@ -135,8 +135,8 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """Return the rotation that is nearest to a matrix M, up to rounding.
 
     The method is one Newton step (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U
-    (I - 3/2 E^2). Here |E| is 3e-9 at most, so the error of the result is 1.4e-17 at most, an eighth of a
-    rounding error.
+    (I - 3/2 E^2). The norm |E| is 3e-9 at most. Therefore, the error of the result is 1.4e-17 at most, which
+    is an eighth of a rounding error.
 
     Args:
         M: (..., 3, 3), a rotation whose entries are rounded to nine decimals.
@@ -357,7 +357,8 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
         InputError: a wrong shape, or `R` is not a rotation.
     """
     R = rotations(R, "R")
-    # K = 4 q q^T is linear in R. The row of K with the largest diagonal entry gives q without cancellation.
+    # The entries of K = 4 q q^T are sums of entries of R (and 1 on the diagonal). Each row of K is a multiple
+    # of q, and the row with the largest diagonal entry gives q without cancellation.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace
@@ -842,12 +843,11 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # R_first^T R = R_second R_third. The row of this product that belongs to the second axis depends only on
-    # the third angle.
+    # The matrix R_first^T R is R_second R_third. Its row `j` (the second axis) depends only on the third
+    # angle.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # R_third rotates about the third axis, so it rotates the plane of two axes: the second axis and the axis
-    # `rest`.
+    # This row has only two entries that are not 0: those of the second axis and of the axis `rest`.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()
@@ -964,7 +964,8 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     """Return the matrix Omega^-1, computed from the geometry of the axes and not by elimination (7.56).
 
     In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
-    axis lies in a coordinate plane. The rates then follow from the components of w one after the other.
+    axis has no component along the second axis. One component of w then gives the third rate, and the other
+    two components give the first and the second rate.
 
     Args:
         name: SciPy's name of the sequence.
@@ -984,8 +985,8 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
     axes = sequence(name)
     turns = axes.turning(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # Components of the third axis in the frame after the first rotation: `along` is the component along the
-    # first axis, `across` the component along the axis `other`.
+    # The third axis has two components in the frame after the first rotation: `along` the first axis, and
+    # `across`, which is along the axis `other`.
     if axes.proper:
         along, across = cosine, -axes.sign * sine
     else:

@@ -21,39 +21,39 @@ the parts. The errors of urdfkin and of Pinocchio may have opposite signs, so th
 5.7 + 16.8 = 22.5. `tests/kinematics/test_roundings.py` computes these counts: it runs the same equations on
 numbers that record each of their roundings.
 
-Two further operations have rounding errors: the sum over the joints, and the cross products of a term. In
-each implementation, they add at most 2 eps for all two or three factors of the term
-(`urdfkin.verify.bounds`). Two margins cover these errors. The count uses one joint more than the path has,
-which covers the frame's own offset and the first sum. `ROUNDINGS` is 24 instead of 22.5, which covers the
-other sums.
+The acceleration of a frame, for example, is a sum of terms such as w x (w x d); w, w and d are the three
+factors of this term. Two further operations have rounding errors: the sum of the terms over the joints, and
+the cross products in a term. In each implementation, they add at most 2 eps for all two or three factors of
+the term (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count is for one joint more
+than the path has. This joint covers the frame's own offset and the first sum. Second, `ROUNDINGS` is 24
+instead of 22.5, and this difference covers the other sums.
 
-The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each factor
-R d or z is rotated once by every joint before it. In a link's axes, w of link k is multiplied by the inverse
-rotation of each joint before link k. A term of link k is multiplied by the rotation of each joint between
-link k and the frame. Finally the term is multiplied once by R, the product of all rotations. For w x (w x d),
-the number of rotations is at most three times the number of joints of the path. In the world's axes, the
-number of rotations is the same.
+The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
+axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
+multiplied by the inverse rotation of each joint before link k. A term of link k, such as w x (w x d), is
+multiplied by the rotation of each joint between link k and the frame. Finally this term is multiplied once by
+R, the product of all rotations. For w x (w x d), the number of rotations is at most three times the number of
+joints of the path. In the world's axes, the number of rotations is the same.
 
-If a joint's axis is **not a coordinate axis**, urdfkin needs two more products before the joint's rotation.
-Let A be the rotation that turns z to the joint's axis. In the first product, the constant rotation is
-multiplied by A. In the second product, it is multiplied by the inverse of A of the previous joint. Pinocchio
-uses Rodrigues' formula. In urdfkin and in Pinocchio, the result depends on the length of the axis. If all 340
-roundings add up, the error is 41. The bound does not cover this worst case. If each rounding error is
-uniformly distributed over its range, the standard deviation of the sum is 3.3. For a single joint,
-`ROUNDINGS` is seven times this standard deviation.
+If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix products for this joint. Let
+A be the rotation that turns z to the joint's axis. urdfkin multiplies the joint's constant rotation by A, and
+by the inverse of the previous joint's A. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
+result depends on the length of the axis. If all 340 roundings add up, the error is 41. `ROUNDINGS` does not
+cover this worst case. If each rounding error is uniformly distributed over its range, the standard deviation
+of the sum is 3.3. For a single joint, `ROUNDINGS` is seven times this standard deviation.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let t be its angle (the tilt). Then |Q R Q^T - R| <= 2
-|Q - 1| <= 2 t. If the joint rotates a vector, or translates it along its axis, the error is at most 2 t. The
-same error occurs in each later factor. A tilt larger than eps is a finding (URDF514). For the frames after
-that joint, the count of each factor is therefore larger by 2 t / eps.
+|Q - 1| <= 2 t. If the joint rotates a vector, or translates it along its axis, the error is at most 2 t. All
+vectors after this joint have the same error. Therefore, for the frames after this joint, the count of each
+factor is larger by 2 t / eps. If the tilt is larger than eps, urdfkin reports the finding URDF514.
 
-**An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. Small numbers in a
-row of a constant rotation, or in an offset, are omitted. A number is small if it is less than half an eps of
-the largest number in that row or offset. The omission causes an error of half an eps, but it also removes the
-rounding errors of a product and of a sum. The compiler decides whether products and sums are fused. The sine
-and cosine are those of a library. In batches in C, the sine and cosine are polynomials with an error of one
-eps. Their angle is reduced in three parts.
+**An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. An export also omits
+small constants. A number of a constant rotation is small if it is less than half an eps of the largest number
+in its row. A component of an offset is small if it is less than half an eps of the largest component. Each
+omission causes an error of half an eps, but the rounding errors of one product and one sum disappear. The
+compiler decides whether products and sums are fused. The sine and cosine are those of a library. In batches
+in C, the sine and cosine are polynomials with an error of one eps. Their angle is reduced in three parts.
 
 | Roundings of the polynomials, with r the reduced angle | |
 |---|---|
@@ -75,13 +75,15 @@ The counts of an export's joint are
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
 offset's length. If a component is omitted, its products in a matrix row or in a cross product are omitted
 too. These products would have an error of 1.5, which is larger. Without fused multiply-adds, an export and
-Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint, plus the sums above. `ROUNDINGS` does not
-cover this worst case. The standard deviation is the same as for urdfkin. In a comparison of an export with
-true values (test vectors), the error is at most 7.2, which is within `ROUNDINGS`.
+Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint, plus the errors of the sums over the joints.
+`ROUNDINGS` is 24.0 and does not cover these sums. The standard deviation is the same as for urdfkin. In a
+comparison of an export with true values (test vectors), the error is at most 7.2, which is within
+`ROUNDINGS`.
 
 **An export in single precision** has a bound of its own for each number of a test vector. The unit is eps =
-2^-23. `urdfkin.export.single` multiplies the error of each operation and of each constant by the derivative
-of the result, and adds the absolute values. The error of one operation is
+2^-23. `urdfkin.export.single` multiplies the error of each operation by the derivative of the result with
+respect to the value of this operation. It does the same for each constant. The bound is the sum of the
+absolute values of all these products. The error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -91,11 +93,11 @@ of the result, and adds the absolute values. The error of one operation is
 | sine and cosine of a library: 3.5 units in the last place (SLEEF, used by PyTorch); CUDA has 2 | 3.5 |
 | sine and cosine by the polynomials of C's batches, in eps of 1 | 1.0 |
 
-A change of sign has no error. The inputs of test vectors are single-precision numbers, so they have no error.
-A number below the smallest normal number, 2^-126, has an error of 2^-126 at most, because GPUs and some
-compilers replace it by 0. The constants also have the rounding errors of the export in double precision.
-Therefore, the bound in single precision contains the bound in double precision, converted by the factor 2^-52
-/ 2^-23. An export has no other operations, so there are no other errors.
+A change of sign has no error. A test vector contains its inputs as single-precision numbers, so the inputs
+have no rounding error. A number below the smallest normal number, 2^-126, has an error of 2^-126 at most,
+because GPUs and some compilers replace it by 0. The constants also have the rounding errors of the export in
+double precision. Therefore, the double-precision bound, multiplied by 2^-52 / 2^-23, is added to the
+single-precision bound. An export has no other operations, so there are no other errors.
 
 **MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. For each joint, MuJoCo
 multiplies this quaternion by the quaternion of the constant rotation and by the quaternion of the joint's
@@ -106,19 +108,20 @@ converts it to a matrix. If all roundings add up, the error is
 |---|---|
 | a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
 
-With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2. The difference covers the same sums
-as above. MuJoCo uses the axes of the file.
+With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2, which covers the sums over the
+joints too. MuJoCo does not replace the file's axes by coordinate axes.
 
-**A mimic joint** adds no rounding. urdfkin and the oracle compute its angle as fl(fl(m q) + c), with the same
-doubles m and c, and neither fuses the two operations. IEEE 754 then defines the result to the last bit. If a
-mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the same order, from the
-mimicked joint outwards. The errors of sine and cosine are counted above. Sine and cosine first subtract
-multiples of pi/2 from their argument. This subtraction is exact for every angle, also for 1e12 rad. Therefore
-a mistake in a mimic joint's angle is always detected.
+**A mimic joint** adds no rounding. urdfkin and the oracle compute its angle m q + c from the same doubles m
+and c. Both round twice: after the multiplication and after the addition. IEEE 754 then defines the result to
+the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the
+same order, from the mimicked joint outwards. The errors of sine and cosine are counted above. Sine and cosine
+first subtract multiples of pi/2 from their argument. This subtraction is exact for every angle, also for 1e12
+rad. Therefore a mistake in a mimic joint's angle is always detected.
 
-**A base** that is rotated counts as one joint more. A base without a rotation adds no rounding. The user's
-matrix M has nine correct digits. Both implementations replace M by the nearest rotation, each by its own
-method. Therefore, it does not matter how far M is from a rotation. The counts, with u = eps/2, are
+**A base** with a rotation M adds one joint to the count. A base without a rotation adds no rounding. The
+user's matrix M has nine correct digits. Both implementations replace M by the nearest rotation, each by its
+own method. Therefore, the error does not depend on the distance of M from the nearest rotation. The counts,
+with u = eps/2, are
 
 | | urdfkin | Pinocchio |
 |---|---|---|
@@ -145,13 +148,13 @@ satisfy it up to
 | sum | 7.5 |
 
 The tolerance is this sum, multiplied by the size of all these terms and by k + 1. Here k is the number of
-mimic rules up to the mimicked joint.
+mimic rules from this joint to the joint that has a coordinate of its own.
 
 **Numbers near zero.** A product below the smallest normal number loses bits. Its error is 2^-1075, half the
 smallest subnormal number, which is (eps/2) times the smallest normal number. Every scale that is not zero is
-therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). Therefore `count * eps *
-scale` is larger than this error, also after later multiplications. The smallest unit is eps times the
-smallest normal number, 2^-1074.
+therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). Therefore, the tolerance
+`count * eps * scale` is larger than this error, even if the product is multiplied by large numbers later. The
+smallest unit is eps times the smallest normal number, 2^-1074.
 
 **A row** of a Denavit-Hartenberg table has 8 roundings at most:
 
@@ -182,14 +185,14 @@ SINGLE = 2.0**-24
 SMALLEST = sys.float_info.min
 #: The smallest unit of rounding: eps times the smallest normal number. It is the smallest subnormal number.
 LEAST_UNIT = EPS * SMALLEST
-#: This number replaces a divisor 0 if the dividend is 0 too. It is smaller than every measured number.
+#: Least divisor: `max(x, NOT_ZERO)` avoids a division by 0. Every measured number is larger.
 NOT_ZERO = 1e-300
 
-#: Allowed error (in eps) for each joint and each factor of a term, between urdfkin and Pinocchio (derivation
-#: above).
+#: Allowed difference (in eps) between urdfkin and Pinocchio, for each joint and each factor of a term such as
+#: w x (w x d). The module docstring derives it.
 ROUNDINGS = 24.0
-#: Allowed error (in eps) for each joint and each factor of a term, between urdfkin and MuJoCo (derivation
-#: above).
+#: Allowed difference (in eps) between urdfkin and MuJoCo, for each joint and each factor of a term such as w
+#: x (w x d). The module docstring derives it.
 MUJOCO = 30.0
 #: Allowed error (in eps) of a mimic rule of an MJCF file, between urdfkin's tree and MuJoCo (derivation
 #: above).
@@ -216,50 +219,52 @@ SINGLE_OPERATION = {
 #: Error of a sine or cosine that is computed by a polynomial, in eps; not relative to the value.
 SINGLE_POLYNOMIAL = 1.0
 
-# Rounding errors in the constant pose between two joint axes (`urdfkin.dh.common_normals`).
+# Rounding errors of the pose of one joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Error (in eps) for each URDF joint in the pose, between two programs that read the same file. The worst
-#: case is 18.9 (the table above without the rotation about the axis). The standard deviation is 2.4, so this
-#: count is nearly six standard deviations.
+#: Allowed difference (in eps) between the constant poses that two programs read from the same file, for each
+#: URDF joint. If all roundings add up, the difference is 18.9. This is the sum of the first table in the
+#: module docstring, without the rotation about the axis. The standard deviation of the difference is 2.4, so
+#: 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
-#: Error (in eps) for the directions of the two axes. The division of an axis by its length contributes 0.5.
-#: The rotation of an axis by Rodrigues' formula contributes 2.0.
+#: Error (in eps) of the directions of two joint axes. For each axis, the division by its length has an error
+#: of 0.5, and its rotation by Rodrigues' formula has an error of 2.0.
 AXES = 5.0
 #: Error (in eps) for each joint, caused by the program that wrote the file. A double that is written with
-#: fifteen digits (DBL_DIG) has an error of half a unit in the last digit. For an angle up to pi this is 5e-15
-#: rad or 22.5 eps. The error is counted for roll and for pitch, because both tilt an axis; yaw does not tilt
-#: an axis.
+#: fifteen digits (DBL_DIG) has an error of half a unit in the last digit. This is 5e-15 rad, or 22.5 eps, for
+#: an angle up to pi. The number counts this error twice, for roll and for pitch, because both tilt an axis.
+#: Yaw does not tilt it.
 WRITTEN = 45.0
-#: Error of a length along an axis, in units of eps times the length of the path. The dot product contributes
-#: 2.4, and each sum contributes 0.5. Only a few sums are as large as the whole path.
+#: Error of a length along an axis, in units of eps times the length of the path. The dot product has an error
+#: of 2.4, and each sum has an error of 0.5 of its own value. Only a few of these sums are nearly as long as
+#: the whole path.
 SUMMED = 4.0
 
 # Tolerances for round numbers: a number within the tolerance of a round number becomes this round number.
 
-#: Error (in eps) of an angle up to pi. A computed multiple of pi/12 contributes 1.2. The number in a file
-#: contributes 1.0 (half a unit in the last place). The function arctan2 contributes 1.1.
+#: Error (in eps) of an angle up to pi. The errors add up: 1.2 of a computed multiple of pi/12, 1.0 of the
+#: number in a file (half a unit in the last place), and 1.1 of the function arctan2.
 ANGLE = 4.0
-#: Error (in eps) of an entry of a rotation matrix. The entry is a difference of two products, which
-#: contributes 0.75. One of the factors is itself a difference of two products, which contributes another
+#: Error (in eps) of an entry of a rotation matrix. The entry is a difference of two products, which has an
+#: error of 0.75. One factor of these products is also a difference of two products, with another error of
 #: 0.75.
 ENTRY = 2.0
-#: Error of a length that is rounded to twelve digits. It is half of `SUMMED`, in the same unit.
+#: Error of a length that is rounded to twelve digits. Its unit is that of `SUMMED`: eps times the length of
+#: the path.
 DIGITS = SUMMED / 2.0
-#: Error (in eps) of the angle between two rotations. One rotation is computed from roll, pitch and yaw, which
-#: contributes 3.1. The other rotation is the product of three rotations. The sine and the cosine contribute
-#: 0.5 each, and the two products contribute 1.4 and 1.8.
+#: Error (in eps) of the angle between two rotations. One rotation is computed from roll, pitch and yaw, with
+#: an error of 3.1. The other is a product of three rotations. Its errors are 0.5 for the sines, 0.5 for the
+#: cosines, and 1.4 and 1.8 for the two products.
 TURN = 8.0
 
 #: Error (in eps) of a limit of a mimic joint after its conversion to a limit of the mimicked joint. The
-#: conversion has a difference and a quotient, and the mimic rule has a product and a sum. Each of these four
-#: operations contributes 0.5. The total is doubled, so that a value at the limits is accepted.
+#: conversion consists of a subtraction and a division, and the mimic rule consists of a multiplication and an
+#: addition. Each of these four operations has an error of 0.5. The sum 2.0 is doubled, so that a value at the
+#: limits is accepted.
 FOLLOWER = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the number of roundings for each factor of a term.
-
-    The count applies to a comparison of two programs that read the same URDF.
+    """Return the allowed difference (in eps) of two programs with the same URDF, for each factor of a term.
 
     Args:
         joints: (...,) number of joints on the path.
@@ -275,7 +280,7 @@ def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 def of_rows(rows: int) -> float:
     """Return the number of roundings of a pose that is computed from a table with `rows` rows and a tool.
 
-    This number does not contain the rounding of the joint values (half an eps), which the caller adds.
+    The caller must add half an eps for the rounding of the joint values.
     """
     return ROW * (rows + 1)
 
@@ -283,8 +288,8 @@ def of_rows(rows: int) -> float:
 def of_rows_read_back(rows: int) -> float:
     """Return the number of roundings in a comparison of a table with the URDF that was written from it.
 
-    The number is `4 * of_rows(rows)`. The computation with the table contributes `of_rows(rows)`, and so does
-    the computation by Pinocchio. The conversion to roll, pitch and yaw contributes twice as much.
+    The number is `4 * of_rows(rows)`: `of_rows(rows)` for the pose from the table, the same for Pinocchio's
+    pose from the URDF, and twice as much for the conversion to roll, pitch and yaw.
     """
     return 4.0 * of_rows(rows)
 
@@ -304,6 +309,6 @@ def of_two_texts(joints: int) -> float:
 def of_a_fit(rows: int) -> float:
     """Return the number of roundings in a comparison of a URDF with a table that was fitted to it.
 
-    The fit is an iteration. When it stops, its error can be up to 12.5 times `of_rows(rows)`.
+    The fit is iterative. After its last iteration, the error can be up to 12.5 times `of_rows(rows)`.
     """
     return 12.5 * of_rows(rows)

@@ -23,8 +23,8 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST = 130
-#: Unknown equations: they are on page 2 of the chapter, which is lost. 7.7 is on that page too, but section
-#: 7.2 states it.
+#: Numbers of the equations that are unknown, because page 2 of the chapter is lost. Equation 7.7 is on that
+#: page too, but section 7.2 repeats it.
 LOST = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
