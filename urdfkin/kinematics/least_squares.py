@@ -22,7 +22,7 @@ _EASING, _HARDER = 0.03, 10.0
 _SLOW = 0.99
 #: The iteration ends if a full step can reduce the squared error by at most this fraction.
 _NOTHING = 1e-13
-#: Relative rounding error of the norm of the residuals, in eps, divided by the number of residuals.
+#: Relative rounding error (in eps) of the norm of n residuals, divided by n.
 _ROUNDED = 4.0
 
 

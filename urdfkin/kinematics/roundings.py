@@ -226,8 +226,8 @@ SINGLE_POLYNOMIAL = 1.0
 #: module docstring, without the rotation about the axis. The standard deviation of the difference is 2.4, so
 #: 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
-#: Error (in eps) of the directions of two joint axes. For each axis, the division by its length has an error
-#: of 0.5, and its rotation by Rodrigues' formula has an error of 2.0.
+#: Error (in eps) of the directions of two joint axes. Dividing an axis by its length has an error of 0.5.
+#: Rotating it by Rodrigues' formula has an error of 2.0.
 AXES = 5.0
 #: Error (in eps) for each joint, caused by the program that wrote the file. A double that is written with
 #: fifteen digits (DBL_DIG) has an error of half a unit in the last digit. This is 5e-15 rad, or 22.5 eps, for
@@ -235,14 +235,14 @@ AXES = 5.0
 #: Yaw does not tilt it.
 WRITTEN = 45.0
 #: Error of a length along an axis, in units of eps times the length of the path. The dot product has an error
-#: of 2.4, and each sum has an error of 0.5 of its own value. Only a few of these sums are nearly as long as
-#: the whole path.
+#: of 2.4, and each sum has an error of 0.5 of its own value. Only a few of these sums are nearly as large as
+#: the path's length.
 SUMMED = 4.0
 
 # Tolerances for round numbers: a number within the tolerance of a round number becomes this round number.
 
-#: Error (in eps) of an angle up to pi. The errors add up: 1.2 of a computed multiple of pi/12, 1.0 of the
-#: number in a file (half a unit in the last place), and 1.1 of the function arctan2.
+#: Error (in eps) of an angle up to pi. It is the sum of three errors, rounded up: 1.2 for a computed multiple
+#: of pi/12, 1.0 for a number in a file (half a unit in the last place), and 1.1 for arctan2.
 ANGLE = 4.0
 #: Error (in eps) of an entry of a rotation matrix. The entry is a difference of two products, which has an
 #: error of 0.75. One factor of these products is also a difference of two products, with another error of

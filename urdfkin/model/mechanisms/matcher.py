@@ -1,7 +1,8 @@
 """Align mechanism B with mechanism A.
 
-An alignment pairs the joints of A with those of B. It contains the base of B, the order of B's joints, and
-the sign and the zero offset of each joint. The code calls this sign the `sense` of the joint.
+An alignment pairs the joints of A with those of B. It also contains the body of B that corresponds to A's
+first body, the order of B's joints, and the sign and the zero offset of each joint. The code calls this sign
+the `sense` of the joint.
 
 `MechanismMatcher` starts at a body of A and the corresponding body of B. From these bodies it goes through
 both trees, joint by joint. At each joint it chooses the sign and the zero offset for which most later links
@@ -75,7 +76,10 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class Ahead:
-    """The number of joint pairs that the matcher may still compare ahead. Several matchers may share it."""
+    """The number of joint pairs ahead of the current joint that may still be compared.
+
+    Several matchers may share this object.
+    """
 
     left: int
 
@@ -539,8 +543,8 @@ class MechanismMatcher:
         """Return the choice for which most links and axes agree.
 
         If several choices are equally good, the method compares the next `depth` joints too. Example: two
-        axes of B intersect at right angles, and so do two axes of A. They coincide for two different poses of
-        B, so a third axis must decide.
+        axes of B intersect at right angles, and so do two axes of A. Two different poses of B make these axes
+        coincide, so a third axis must decide.
         """
         scored = list[tuple[_Free, Place, Score]]()
         for what, place in choices:
@@ -673,11 +677,11 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
 
 #: Largest number of joint orders that are tried. For example, five prismatic joints have 120 possible orders.
 MOST_ORDERS = 120
-#: Largest number of joint pairs that one search compares ahead (`Ahead`), which takes some seconds. Without
-#: names, the robot TALOS needs 500 of them, and Baxter needs 1,000.
+#: Largest number of joint pairs that one search compares ahead of the current joint. This takes some seconds.
+#: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
 MOST_AHEAD = 2000
-#: Larger tolerances that are tried if A and B differ. Each number is an angle in rad, and a distance divided
-#: by the robot's size.
+#: Larger tolerances that are tried if A and B differ: for angles in rad, and for distances divided by the
+#: robot's size.
 NEARLY = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
 #: Largest number of joint-pair exchanges that are tried: (a, d) and (c, b) instead of (a, b) and (c, d). Only
 #: joints with different names are exchanged.
@@ -738,7 +742,7 @@ def _orders_to_try(
 
 
 def _by_rules(best: Alignment) -> Alignment:
-    """Return the alignment whose zero offsets fit the mimic rules, or `best` if that one is worse."""
+    """Return the alignment with the zero offsets that fit the mimic rules, or `best` if it is better."""
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
@@ -811,8 +815,8 @@ def _best_alignment(
 #: Numbers of full turns that are tried as an addition to the zero offset of a revolute joint with a mimic
 #: rule.
 TURNS = (0, 1, -1)
-#: Tolerance for a zero offset that is computed from the positions of axes, divided by the angle tolerance. It
-#: is large, because the offset is inexact if the axes are close together.
+#: The tolerance of a zero offset is the angle tolerance times this factor. The factor is large, because an
+#: offset computed from the positions of two close axes is inexact.
 LEVER = 1e4
 
 
@@ -864,7 +868,7 @@ class _Rule:
 
 
 def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
-    """Return (sign, new zero offset) of each joint whose offset the mimic rules determine, by A's name."""
+    """Return {name in A: (sign, zero offset)} for joints whose zero offset the mimic rules determine."""
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]

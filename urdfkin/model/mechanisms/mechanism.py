@@ -30,13 +30,13 @@ comes before some joints:
 
 If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree
 everywhere, the two models have the same motion. If they differ somewhere, their motions differ, with one
-exception. If two revolute joints have the same line as axis, only the sum of their two angles matters for the
-links after them.
+exception: two revolute joints may have the same line as axis. Only the sum of their two angles matters for
+the links after them.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
-is a variable. A coordinate of B is plus or minus a variable, plus a zero offset. If a joint can move
-independently only in B, its coordinate is one more variable. For example, the joint may be a mimic joint or a
-fixed joint in A.
+is a variable. A coordinate of B is a linear function of a variable; the sign and the zero offset of the joint
+determine it. If a joint can move independently only in B, its coordinate is one more variable. For example,
+the joint may be a mimic joint or a fixed joint in A.
 """
 
 from __future__ import annotations
@@ -206,7 +206,7 @@ def undoing(M: FloatArray) -> FloatArray:
 
     M must keep the direction of the plane's normal or reverse it. Then M consists of a translation along the
     normal and a motion in the plane. If M reverses the normal, M also contains half a turn about x. N
-    contains the opposite translation and, if needed, the second half turn.
+    contains the opposite translation, and the same half turn if M contains it.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -444,7 +444,7 @@ class Step:
         a: Joint of A (index in its tree).
         b: Joint of B (index in its tree).
         kind: Kind of motion: "turns" (revolute), "prismatic", "planar" or "floating".
-        previous: Index of the step before this step on the path from the base; -1 if this is the first step.
+        previous: Index of the previous step on the path from the base; -1 for the first step.
         sense: +1 or -1, the factor in the formula of `offset`.
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) the rigid motion L that is inserted before B's joint, in A's zero configuration.
@@ -700,8 +700,7 @@ class Pair:
     b: Line
     #: The value of B's joint as B's URDF defines it: sense * b + offset.
     written: Line
-    #: Rounding error (rad or m) that was removed from the constant of `b`, less the rounding error of one
-    #: step.
+    #: Rounding error (rad or m) that was removed from the constant of `b`, minus that of one step.
     rounding: float = 0.0
 
     @property

@@ -23,9 +23,9 @@ If joint i is the same in A and B, the first three terms are 0. For each directi
 at most the sum of the maxima of these four terms. urdfkin computes the maxima from the support functions of y
 and d. If A and B differ at one joint only, the bound exceeds the true maximum only because of the
 interpolation. If A and B differ at several joints, the terms of these joints may be largest in different
-configurations. In this case, the bound exceeds the true maximum for this reason too. If A and B differ only
-in constant motions L, urdfkin also computes a second bound without interpolation. The second bound is the sum
-of the distances by which each L can move the frame.
+configurations. The sum of their maxima then exceeds the true maximum. If A and B differ only in constant
+motions L, urdfkin also computes a second bound without interpolation. The second bound is the sum of the
+distances by which each L can move the frame.
 """
 
 from __future__ import annotations
@@ -147,11 +147,11 @@ class Support:
     def turned_back(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return the support function's values (angles, n) at the n grid points after rotations of the set.
 
-        The set rotates about `axis` by each of `angles` (rad). By h'(u) = h(R^T u), the method rotates the
-        grid points by the opposite angle.
+        The set rotates about `axis` by each of `angles` (rad). Since h'(u) is h(R^T u), the method rotates
+        the grid points by the opposite angle.
 
-        `factors` contains a factor for each angle; it multiplies the grid point's component perpendicular to
-        the axis.
+        The component of a grid point perpendicular to the axis is multiplied by the angle's number in
+        `factors`.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -220,7 +220,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
     return [(low, 1.0), *middles, (high, 1.0)]
 
 
-#: The coarse grid is for the bounds of all frames. The fine grid is for a second, smaller bound of one frame.
+#: `COARSE` is for the bounds of many frames; `FINE` gives a smaller bound, but takes longer.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
 #: Largest number of sample values of a revolute joint's variable. If the variable's range needs more, the
 #: joint's angles in A and B are treated as independent.
@@ -305,7 +305,7 @@ def _off(L: FloatArray, reach: float) -> float:
 
 
 def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return the support functions of d and y before any joint is added; d and y are then single points."""
+    """Return d and y at the frame, with which the recursion of the module docstring begins."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -314,9 +314,9 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def passed(
     step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Add a joint to the chain: return the new support functions of d and y (module docstring)."""
-    # A planar or floating joint has no limits, so it may rotate d into any direction. Therefore, the new
-    # support function of d has the largest length of d in every direction.
+    """Return d and y of the recursion (module docstring) after one more joint."""
+    # A planar or floating joint has no limits, so it may rotate d into any direction.
+    # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
         d = Support(d.grid, d.largest() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
@@ -328,7 +328,7 @@ def passed(
 
 
 def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
-    """Move d and y by the constant rigid motion L before B's joint, and return their support functions."""
+    """Return d and y of the recursion (module docstring) after the constant rigid motion L of a step."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -336,7 +336,7 @@ def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
 
 
 def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Support) -> Support:
-    """Return the support function of d after a joint, (e(S' t') - e(S t)) y + e(S t) d (module docstring)."""
+    """Return d of the recursion (module docstring) after one more joint, but before its motion L."""
     same = step.other is step.axis and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis.direction, np.zeros(3))
@@ -350,7 +350,7 @@ def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Supp
 
 
 def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
-    """Return the support function of B's translation minus A's translation, for two matched prismatic joints.
+    """Return the support function of the difference between the translations by two matched prismatic joints.
 
     The difference is largest if each joint value is at one of its limits.
     """
@@ -387,7 +387,7 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
 
 
 def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
-    """Return the result of `difference` for two revolute joints that are moved by the same variable.
+    """Return the result of `difference` for two revolute joints that the same variable moves.
 
     `z` contains sample values of the variable; let h be the distance between two neighbouring samples.
     Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
@@ -425,10 +425,11 @@ def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Sup
 
 
 def _independent_difference(step: Step, pair: Pair, variables: Variables, y: Support) -> Support:
-    """Return the support function of (e(S' t') - e(S t)) y; the angles t and t' are treated as independent.
+    """Return the change of d by two revolute joints whose angles are treated as independent.
 
-    If A and B have the same axis, a point's two positions differ at most by the chord of the largest |t' -
-    t|. If the axes differ, the result is the sum of the support functions of e(S' t') y and -e(S t) y.
+    If A and B have the same axis, a point's two positions differ at most by the chord of the largest
+    difference of the two angles. If the axes differ, the result is the sum of the support functions of
+    e(S' t') y and -e(S t) y.
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:
