@@ -131,17 +131,17 @@ class MechanismMatcher:
         self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
-        #: For each body of A and of B: the result of `_counts`.
+        #: The results of `_counts` for A and for B.
         self.counts = _counts(a), _counts(b)
-        #: The number of agreements that the best alignment has so far.
+        #: The number of joints and links that agree in the best alignment so far.
         self.matched = 0
-        #: The search for exact matches of subtrees. It is None if `gauge` prescribes the choices.
+        #: The search for exactly matching subtrees; None if the argument `gauge` prescribes the alignment.
         self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
 
     def best(self) -> Alignment:
-        """Return the best alignment over all starting bodies; of equally good ones, the first."""
+        """Return the best alignment over all first bodies, or the first of several that are equally good."""
         best: Alignment | None = None
         for bodies, X in self._beginnings():
             found = self._run(bodies, X)
@@ -153,10 +153,10 @@ class MechanismMatcher:
         return best
 
     def _beginnings(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield pairs of bodies at which the matcher can begin, with a pose of B's root in A's root frame.
+        """Yield pairs of bodies at which the matcher can start, with a pose of B's root in A's root frame.
 
-        The most likely pair comes first. Pairs from which fewer joints and links can agree than in the best
-        alignment so far are left out.
+        The most likely pair comes first. A pair is omitted if fewer joints and links can agree from it than
+        agree in the best alignment so far.
         """
         if self.gauge is not None:
             names = self.gauge.base
@@ -182,11 +182,11 @@ class MechanismMatcher:
                     yield base, X
 
     def _most(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the number of joints and links that agree from two bodies on.
+        """Return an upper bound on the number of agreeing joints and links, for a start at two bodies.
 
         Each branch at one body is matched with at most one branch at the other body. In two matched branches,
-        no more joints agree than the smaller branch has, and no more links. The sum of these numbers is
-        largest if the branches are matched in the order of their sizes.
+        at most all joints and all links of the smaller branch agree. The sum of these numbers is largest if
+        the branches are matched in the order of their sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):  # joints, links
@@ -278,7 +278,7 @@ class MechanismMatcher:
     # -- matching ------------------------------------------------------------------------------------
 
     def _run(self, base: tuple[int, int], X: FloatArray) -> Alignment:
-        """Return the alignment that starts at a pair of bodies, with the pose X of B's root."""
+        """Pair all joints and links, starting at two bodies; X is the pose of B's root in A's root frame."""
         found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
         stack = [Place(base, (None, None), -1, IDENTITY, X)]
         while stack:
@@ -598,9 +598,9 @@ class MechanismMatcher:
 
 
 def _counts(mechanism: Mechanism) -> list[tuple[int, int]]:
-    """Return for each body the numbers of joints and of links from the joint before the body to the tips.
+    """Return the numbers of joints and links in each body's subtree, with the joint before the body.
 
-    The root body, which no joint carries, is counted like a body with a joint.
+    The root body has no joint before it, but is counted as if it had one.
     """
     found = [(1, len(links)) for links in mechanism.bodies]
     for edge in reversed(mechanism.edges):  # from the tips to the root

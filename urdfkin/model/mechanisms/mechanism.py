@@ -685,7 +685,7 @@ class Line:
         return Line(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Return the function's value for given values of the variables; a variable without a value is 0."""
+        """Return the function's value for the given values of variables; a variable without a value is 0."""
         return self.constant + (self.slope * values.get(self.variable, 0.0) if self.slope else 0.0)
 
 
