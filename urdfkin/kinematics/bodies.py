@@ -91,8 +91,8 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 
     Args:
         outer: Motion of frame 1 relative to frame 0.
-        inner: Motion of frame 2 relative to frame 1, expressed in frame 1. Here the attributes `..._0_1`
-            belong to frame 2 relative to frame 1.
+        inner: Motion of frame 2 relative to frame 1, expressed in frame 1. In this argument, for
+            example, `d_0_1` is the vector from O_1 to O_2.
 
     Returns:
         Motion of frame 2 relative to frame 0.

@@ -72,7 +72,7 @@ def about_y(sine, cosine, zero, one):
 
 
 def about_z(sine, cosine, zero, one):
-    """7.5 in three dimensions: the rotation of a rotary joint with axis z."""
+    """Return a rotation about z, which is 7.5 in three dimensions."""
     return (cosine, -sine, zero), (sine, cosine, zero), (zero, zero, one)
 
 
@@ -112,7 +112,7 @@ def tangential(w, d):
 
 
 def point_velocity(vel, w, d):
-    """7.59, 7.115, 7.128: velocity of a point at d from another point of the link, which has velocity vel."""
+    """7.59, 7.115, 7.128: velocity of the point P + d of a link, whose point P has the velocity vel."""
     return plus(vel, tangential(w, d))
 
 
@@ -150,7 +150,7 @@ def angular_acceleration(alpha, w, z, v, a):
 
 
 def point_acceleration(acc, alpha, w, d):
-    """7.123, 7.130: acceleration of a point at d from another point of the link, with acceleration acc."""
+    """7.123, 7.130: acceleration of the point P + d of a link, whose point P has the acceleration acc."""
     return plus(plus(acc, transverse(alpha, d)), centripetal(w, d))
 
 

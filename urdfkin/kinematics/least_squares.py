@@ -42,7 +42,7 @@ def least_squares(
         residuals: Returns the residuals (rows,) of a state, and intermediate results that `derivatives` uses.
         derivatives: Returns the negative derivatives (rows, parameters) of a state's residuals with respect
             to the parameters.
-        moved: Returns the state that results from a state and a step (parameters,).
+        moved: Returns the new state after a step (parameters,) from a state.
         longest: Largest component of a step.
         patience: The iteration ends after this many slow steps; 0 means no limit.
     """

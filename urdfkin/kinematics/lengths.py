@@ -18,7 +18,7 @@ _Z = 1.0  #: Length of a joint's axis.
 
 
 def carried(state: State, d: Length) -> State:
-    """Return the state of the link's point at the distance d (7.58, 7.128, 7.130)."""
+    """Return the bounds for the link's point at the distance d (7.58, 7.128, 7.130)."""
     p, w, vel, alpha, acc = state
     return (
         eq.point_position(p, None, d),

@@ -496,8 +496,8 @@ def integrate_orientation(
 
     Args:
         w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. This function must be
-            smooth within a step, so add a time to `times` at each jump. At the start and the end of a step, w
-            is evaluated slightly inside the step.
+            smooth within a step, so add a time to `times` at each jump. For the start and the end of a time
+            step, w(t) is evaluated slightly inside the step.
         quat: (..., 4) orientation at `times[0]`, unit quaternion, scalar last.
         times: (n,) increasing times in s; the method makes one step from each time to the next.
         frame: Frame of w: "fixed" means frame 0, "body" means the body's own frame.
@@ -745,7 +745,7 @@ class Sequence:
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Return angles or their rates in the order of the body-fixed axes.
+        """Return the angles, or their rates, in the order of the rotations about body-fixed axes.
 
         A second call with the result returns the original order.
         """

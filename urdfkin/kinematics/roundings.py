@@ -216,7 +216,7 @@ SINGLE_OPERATION = {
     "sin": 3.5,
     "cos": 3.5,
 }
-#: Error of a sine or cosine that is computed by a polynomial, in eps; not relative to the value.
+#: Absolute error (in eps) of a sine or cosine that is computed by a polynomial.
 SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors of the pose of one joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
@@ -239,7 +239,7 @@ WRITTEN = 45.0
 #: the path's length.
 SUMMED = 4.0
 
-# Tolerances for round numbers: a number within the tolerance of a round number becomes this round number.
+# Tolerances: a number that differs less than this from a round number is replaced by the round number.
 
 #: Error (in eps) of an angle up to pi. It is the sum of three errors, rounded up: 1.2 for a computed multiple
 #: of pi/12, 1.0 for a number in a file (half a unit in the last place), and 1.1 for arctan2.

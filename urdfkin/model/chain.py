@@ -241,7 +241,7 @@ class FrameChain(Displayable):
 
 
 def _rule_text(joint: ChainJoint) -> list[str]:
-    """Return a list with the mimic rule of a joint as text; the list is empty if the joint has no rule."""
+    """Return a list with the text of a joint's mimic rule, or an empty list without a rule."""
     return [f"= {joint.mimic}"] if joint.mimic else []
 
 
@@ -300,7 +300,7 @@ def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint,
 def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
     """Return the constant poses before and after a joint's motion, in path order.
 
-    The motion itself is about or along z.
+    Between these two poses, the joint rotates about z or slides along z.
     """
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)

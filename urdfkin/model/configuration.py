@@ -50,7 +50,7 @@ class NarrowedRange:
 
     Attributes:
         joint: Name of the mimicked joint.
-        own: The range that follows from the limits of the mimicked joint.
+        own: The range from the limits of the mimicked joint.
         kept: The part of the range `own` in which all mimic joints are within their limits; None if there is
             no such part.
         by: Names of the mimic joints whose limits make the range smaller.
@@ -81,7 +81,7 @@ def range_words(ends: tuple[float, float]) -> str:
 
 
 def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
-    """Return the range of a joint with one axis.
+    """Return the lower and upper end of a joint's range, rad or m.
 
     Without limits, the range of a revolute joint is -pi to pi (rad), and that of a prismatic joint is
     -`slide` to `slide` (m).
@@ -100,7 +100,7 @@ def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int =
 def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the range of each joint that has exactly one coordinate.
 
-    Only the joint's own limits are used, and not the limits of joints that mimic this joint.
+    The ranges do not consider the limits of joints that mimic a joint.
     """
     return {joint.name: _own_range(joint) for joint in tree.joints if joint.nq == 1}
 
@@ -152,7 +152,7 @@ def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[f
     """
 
     def keeps(leader: float) -> bool:
-        # As in `limit_violations`: a limit printed in decimal is rounded.
+        # One unit in the last place beyond a limit is allowed, because a limit in decimal is rounded.
         own = rule.multiplier * leader + rule.offset
         return bool(np.nextafter(limit.lower, -np.inf) <= own <= np.nextafter(limit.upper, np.inf))
 
@@ -235,7 +235,7 @@ def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def places(tree: KinematicTree, what: str) -> CoordinateLayout:
-    """Return the names and units of "q", "v" or "a", to parse values that are given by name."""
+    """Return the names and units of the numbers of q, v or a, with which values are parsed."""
     is_q = what == "q"
     spans = {
         joint.name: (at, joint.nq if is_q else joint.nv)
@@ -309,8 +309,8 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    `ready` is within the limits. The catalogue defines `ready` for some robots. For any other robot, a joint
-    whose limits exclude 0 is in the middle of its range, and every other joint is as in `neutral`.
+    `ready` is within the limits. The catalogue defines `ready` for some robots. For any other robot, `ready`
+    is `neutral`, but a joint whose limits exclude 0 is in the middle of its range.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -379,7 +379,7 @@ def locked_values(
 def _demand_within_limits(tree: KinematicTree, held: Mapping[str, float]) -> None:
     """Check that locked joints are within their limits.
 
-    Joints that mimic a locked joint are checked too, if their limits can be satisfied.
+    Joints that mimic a locked joint are checked too, unless they violate their limits at every value.
     """
     q = np.full(tree.nq, np.nan)  # NaN is never outside a limit
     for name, value in held.items():
@@ -483,7 +483,7 @@ def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
 
 
 def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str]]:
-    """Yield each joint that is outside its limits, with its line of text for `limit_violations`."""
+    """Yield each joint that is outside its limits, with a message."""
     for joint, values in zip(tree.joints, _own_values(tree, q), strict=True):
         if values is None or joint.limit is None or not values.size:
             continue
@@ -720,7 +720,7 @@ def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
 
 
-#: The samples of a joint with several coordinates.
+#: Functions that draw random coordinates of a joint with several coordinates.
 _SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
 
 

@@ -250,8 +250,8 @@ keeps: 'neutral, elbow=...'
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
     """Return values that have names.
 
-    A text or a mapping is returned unchanged, and a table with labels becomes a mapping. Return None for a
-    plain list of numbers.
+    A text or a mapping is returned unchanged. A table with labels, such as a data frame, is converted
+    to a mapping. For numbers without names, the result is None.
 
     Raises:
         InputError: a label occurs twice, or `value` is a list of tables with labels.
@@ -280,7 +280,10 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
 
 
 def _labels(value: object) -> list[Any]:
-    """Return a table's labels (`keys()`, `columns` or `column_names`); empty if they are 0, 1, 2, ..."""
+    """Return a table's labels: its `keys()`, `columns` or `column_names`.
+
+    The result is empty if the labels are 0, 1, 2, ...
+    """
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []

@@ -81,13 +81,13 @@ class Recursion:
         return x if self.own else self.eq.rotate(s.R, x)
 
     def carried(self, s: State, d: Vector) -> State:
-        """Return the state of the link's point at the offset d (equations 7.58, 7.128, 7.130)."""
+        """Return the state of the point at the offset d from the link's origin (7.58, 7.128, 7.130)."""
         eq, lever = self.eq, self.seen(s, d)
         vel, acc = eq.point_velocity(s.vel, s.w, lever), eq.point_acceleration(s.acc, s.alpha, s.w, lever)
         return replace(s, p=eq.point_position(s.p, s.R, d), vel=vel, acc=acc)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Return the state of the same body for a frame that is rotated by S."""
+        """Return the state of a frame that is fixed to the same body, but rotated by S."""
         R = self.eq.product(s.R, S)
         if not self.own:
             return replace(s, R=R)
@@ -97,7 +97,8 @@ class Recursion:
     def revolute(self, s: State, axis: Vector, S: Matrix, v: Number, a: Number) -> State:
         """Return the state after a revolute joint.
 
-        Equation 7.129 is applied first, then 7.127, then the rotation S of the frame.
+        The method uses 7.129 for the angular acceleration and 7.127 for the angular velocity. Then it rotates
+        the frame by S.
         """
         z = self.seen(s, axis)
         alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
@@ -106,7 +107,7 @@ class Recursion:
     def prismatic(self, s: State, axis: Vector, x: Number, v: Number, a: Number) -> State:
         """Return the state after a prismatic joint.
 
-        Equation 7.64 gives the displacement; then 7.130 and 7.128 are applied.
+        The method uses 7.64 for the displacement, 7.130 for the acceleration and 7.128 for the velocity.
         """
         s = self.carried(s, self.eq.times(x, axis))
         z = self.seen(s, axis)

@@ -9,11 +9,11 @@ from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.model.configuration import narrowed_ranges
 from urdfkin.model.tree import Joint, KinematicTree
 
-#: Columns of a joint: limits in rad and rad/s, for prismatic joints in m and m/s.
+#: Columns of the table of joints. Limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
 #: Indices of the text columns; link and joint are columns 0 and 1.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
-#: The indices of the text columns in a table that begins with the joint, its parent link and its child link.
+#: Indices of the text columns, if the first columns are the joint, its parent link and its child link.
 _AFTER_JOINT = (1, 2, *(i + 1 for i in WORDS[2:]))
 
 

@@ -223,7 +223,7 @@ class Joint:
     def length(self) -> float:
         """Length (m) of the joint's offset from its parent link.
 
-        The displacement of a locked prismatic joint is added.
+        If the joint is a locked prismatic joint, the length includes its displacement.
         """
         # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids this.
         own = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
@@ -467,17 +467,14 @@ class KinematicTree:
         return None
 
     def _unambiguous(self, *names: FrameName) -> list[str]:
-        """Return a list with the first of these frame names that is no name of a link or joint.
-
-        If there is none, the list is empty.
-        """
+        """Return a list with the first of `names` that no link or joint has; empty if there is none."""
         known = self._link_index.keys() | self._joint_index.keys()
         return [str(name) for name in names if name not in known][:1]
 
     def frame_name(self, link: int) -> str:
-        """Return a name that `frame_link` resolves to this link.
+        """Return a name for which `frame_link` returns this link.
 
-        If the link's own name is ambiguous, the result is a `LinkFrame`.
+        It is the link's own name, or a `LinkFrame` if the joint of another link has the same name.
         """
         name = self.links[link]
         joint = self._joint_index.get(name)

@@ -83,7 +83,7 @@ class JointRule:
 
     @property
     def factor(self) -> float | None:
-        """The factor from rad or m to `unit`, multiplied by `sign`; None if `unit` is None."""
+        """The number of units in one rad or m, multiplied by `sign`; None if `unit` is None."""
         if self.unit is None:
             return None
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)

@@ -1,10 +1,9 @@
 """Convert q, v, a, Jacobians and six-vectors of one robot to another program's convention, and back.
 
-The target program can be any other program or library for robots. With the matrix M of `Conversion.matrix`,
-joint velocities convert as v_tool = M(q) v, accelerations as a_tool = M a + M' v, and Jacobians as J_tool = S
-J M^-1. M' is the time derivative of M. S exchanges the linear and the angular rows if the target program has
-the angular rows first. M is constant unless the target program and urdfkin use different axes for the
-velocity of a floating or planar joint.
+The target program can be any other program or library for robots. Let M be the matrix `Conversion.matrix`,
+and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v, and J_tool = S J M^-1. S exchanges the
+linear and the angular rows if the target program has the angular rows first. M is constant unless the target
+program and urdfkin use different axes for the velocity of a floating or planar joint.
 """
 
 from __future__ import annotations
@@ -120,7 +119,7 @@ class Conversion:
     # -- layout --------------------------------------------------------------------------------------
 
     def _ordered(self) -> list[int]:
-        """Return the indices of the joints that have columns, in the target program's order."""
+        """Return the indices of the joints that the target program's q contains, in its order."""
         tree, how = self.tree, self.convention
         moving = {i for i, joint in enumerate(tree.joints) if joint.kind.nv}
         if how.order == "given":
@@ -164,9 +163,9 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _follows(self, i: int) -> bool:
-        """Whether the value of a joint determines a coordinate of q.
+        """Return whether a joint's value can be converted to a coordinate of q.
 
-        This is False for a mimic joint with a constant value.
+        This is impossible for a mimic joint with the multiplier 0.
         """
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
@@ -224,7 +223,7 @@ class Conversion:
         return order
 
     def _add(self, i: int) -> str:
-        """Add the columns of a joint, and return the joint's name in the target program."""
+        """Append a joint's numbers to the columns of q, and return the joint's name in the target program."""
         how, joint = self.convention, self.tree.joints[i]
         rule = how.rules.get(joint.name, JointRule())
         name = rule.name or spelled(joint.name, how.names)
@@ -543,7 +542,7 @@ class Conversion:
                 )
 
     def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M x, or M x + M' v if v is given; M is `matrix` at q, and M' is its time derivative."""
+        """Return M x, or M x + M' v if v is given, with the matrix M of the module docstring."""
         if self._same_v:
             return x
         found: FloatArray = x[..., self._v_at]
@@ -870,10 +869,7 @@ def _inverse(B: FloatArray) -> FloatArray:
 
 
 def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
-    """Return a copy of `array` with `part` in the slice `where` of the last axis.
-
-    The other axes of `array` and `part` broadcast.
-    """
+    """Return `array` with `part` in the slice `where` of the last axis; all other axes broadcast."""
     shape = np.broadcast_shapes(array.shape[:-1], part.shape[:-1])
     if array.shape[:-1] != shape:
         array = np.broadcast_to(array, (*shape, array.shape[-1])).copy()
@@ -882,7 +878,7 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
 
 
 def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
-    """Return matrices (..., k, l), with an additional axis before k for a Jacobian of several frames."""
+    """Return M (..., k, l), with one more axis before k if the Jacobian contains several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M
 
 

@@ -42,7 +42,7 @@ Via = tuple[Edge | None, Edge | None]
 
 
 def family(kind: JointKind) -> str:
-    """Return a joint's kind of motion, without regard to limits.
+    """Return a joint's kind of motion; revolute and continuous joints have the same kind.
 
     Joints of different kinds are never paired.
     """
@@ -129,7 +129,7 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Return the joint pairs found by name, and the joints that must be paired by geometry.
 
-        The joints that must be paired by geometry are returned separately for A and for B.
+        The second result contains such joints of A, and the third result contains such joints of B.
         """
         if (known := self._by_names.get((bodies, via))) is None:
             known = self._by_names[bodies, via] = self._named_alike(bodies, via)
@@ -475,7 +475,7 @@ def _next_joints(
 ) -> Iterator[Both[Edge]]:
     """Yield all pairs of joints of the same kind at two bodies, one joint of A and one of B.
 
-    Joints without an axis are left out.
+    Joints without an axis are omitted.
     """
     ours, theirs = (
         [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]

@@ -91,7 +91,7 @@ class Place:
     Attributes:
         bodies: Index of the body of A, and index of the body of B.
         via: The joint of A and the joint of B before these bodies; None at the base.
-        previous: Index of the last step; -1 at the base.
+        previous: Index of the step (joint pair) before these bodies; -1 at the base.
         G: (4, 4) motion that moves A's zero configuration to the current pose of B.
         XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
     """
@@ -298,7 +298,7 @@ class MechanismMatcher:
         return found
 
     def _edges(self, place: Place) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the matched pairs of the next joints, and the joints of A and of B without a match."""
+        """Return the pairs of the next joints, the unpaired joints of A, and the unpaired joints of B."""
         pairs = self._exact_pairs(place.bodies, place.via, inverse(place.G) @ place.XC)
         if pairs is not None:
             return pairs, (), ()
@@ -378,7 +378,7 @@ class MechanismMatcher:
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
-        """Match a pair of joints. Return the resulting step, the state after the joints, and its score."""
+        """Match two joints. Return their step, the bodies after them (`Place`), and the score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
@@ -872,7 +872,7 @@ def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # Only joints with the common slope get a new zero offset.
+        # Only joints with the most frequent slope get a new zero offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )

@@ -298,7 +298,7 @@ class Mechanism:
     def in_order(self, names: Sequence[str]) -> Mechanism:
         """Return a mechanism with some consecutive joints in another order. The motion stays the same.
 
-        The result has no bodies for the links between these joints.
+        The result does not contain the links between these joints.
 
         Args:
             names: Names of consecutive joints in their new order, from the inner body outwards.
@@ -333,7 +333,7 @@ class Mechanism:
         return len(run) == len(names) and one_line and all(self._commute(*two, tolerance) for two in changed)
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """For each run of consecutive joints, yield the joint orders that give the same motion."""
+        """For each sequence of joints without a branch, yield all joint orders that give the same motion."""
         run: list[Edge] = []
         for edge in self.edges:  # depth first; a run of joints ends where a body has several child joints
             if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
@@ -513,7 +513,7 @@ class FramePair:
 
     @property
     def differs(self) -> bool:
-        """Whether the pose of the link frame on its body is different in B and in A."""
+        """Whether the link frame has different poses on its body in A and in B."""
         return self.tilt > 0.0 or self.shift > 0.0
 
 
@@ -567,7 +567,10 @@ class Alignment:
 
     @property
     def inner_off(self) -> tuple[float, float]:
-        """Smallest and largest difference (m) between matched axes or matched links with child joints."""
+        """Smallest and largest difference (m) of matched axes, and of matched links that have child joints.
+
+        Differences of 0 do not count.
+        """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         links = [one for one in self.frames if one.a in carry[0] or one.b in carry[1]]
         off = [(step.tilt, step.shift) for step in self.steps] + [(link.tilt, link.shift) for link in links]
@@ -642,7 +645,7 @@ class Alignment:
 
     @property
     def deepest(self) -> int:
-        """The largest number of steps on any path, plus one for the base."""
+        """One more than the number of steps on the longest path."""
         return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
 
 
@@ -849,9 +852,9 @@ class _Maker:
         """Return the range of each coordinate, computed from the limits of all joints that it moves.
 
         If a coordinate moves a joint of A and a joint of B, its range is the intersection of their limits. If
-        this intersection is empty, the range consists of A's limits. The limits of a mimic joint are used
-        only for a coordinate that has no limits of its own, because a mimic joint follows its rule even
-        beyond its limits.
+        A's limits and B's limits do not intersect, the range consists of A's limits. The limits of a mimic
+        joint are used only for a coordinate that has no limits of its own, because a mimic joint follows its
+        rule even beyond its limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}
