@@ -13,6 +13,7 @@ from urdfkin.cli.options import load_robot, robot_argument
 from urdfkin.cli.output import Answer, answering
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_value
+from urdfkin.system.lazy_import import lazy_import
 from urdfkin.urdf.catalogue import Entry, catalogue
 
 if TYPE_CHECKING:
@@ -63,6 +64,10 @@ def _as_dict(entry: Entry) -> dict[str, object]:
     }
 
 
+#: Data for JSON. Its module imports the tables, which the other formats do not need.
+_describe = lazy_import("urdfkin.validation.robot_summary:describe")
+
+
 @click.command("info", epilog="Example: urdfkin info panda")
 @robot_argument
 @answering()
@@ -74,10 +79,8 @@ def info_command(robot: str) -> Answer:
     m/s. A link that is not indented is a child of the link above it. If a link has several children, lines
     lead to them.
     """
-    from urdfkin.validation.robot_summary import describe  # noqa: PLC0415  keeps --help fast
-
     loaded = load_robot(robot)
-    data = {"json": lambda: describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}
+    data = {"json": lambda: _describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}
     return Answer(loaded._sheet, data, fitted=lambda out: _fitted(out, loaded._sheet()))
 
 
