@@ -38,7 +38,7 @@ def seen(axes, R, x):
 
 
 def seen_after(axes, S, x):
-    """Return the components of a velocity or acceleration x for a link frame that is rotated by S.
+    """Return a velocity or acceleration x of a link after the link's frame is rotated by S.
 
     Components in world axes do not change. Components in the link's own axes are converted to the rotated
     axes.

@@ -265,10 +265,11 @@ def task_of(
     Args:
         program: The program of the recursion.
         reference: The reference frame of the results.
-        inputs: The base's state, q and, if needed, v and a. Each of them has one row, or as many rows as
-            `out`.
+        inputs: Arrays: the base's state, q and, if needed, v and a. Each array has one row for all
+            configurations, or one row for each configuration.
         out: (n, ...) array for the result.
-        staged: Whether blocks are collected before output (`is_staged`).
+        staged: Whether the kernel writes results to a buffer first, and then copies the buffer to `out` (see
+            `is_staged`).
     """
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)

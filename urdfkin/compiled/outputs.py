@@ -238,10 +238,11 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
 def _add_changes(s, program, i, first, end, reference):
     """Add the derivatives of column i with respect to the motion of each joint.
 
-    Column i belongs to a joint on the path. An earlier joint on the path rotates the whole column. A later
-    joint moves only the reference point of the column, which is the frame's origin. For WORLD, the reference
-    point does not move, so a later joint does not change the column. For LOCAL, an earlier joint rotates the
-    column and the axes of the frame together, so it does not change the components of the column.
+    Column i belongs to a joint on the path. If an earlier joint on the path turns, the linear and angular
+    parts of column i turn with it. A later joint moves only the reference point of the column, which is the
+    frame's origin. For WORLD, the reference point does not move, so a later joint does not change the column.
+    For LOCAL, an earlier joint rotates the column and the axes of the frame together, so it does not change
+    the components of the column.
     """
     v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
     for j in range(first, end, PAIR_WIDTH):

@@ -1,9 +1,10 @@
 """Compile a robot's tree into arrays, and into a program: the list of instructions that a kernel executes.
 
-The arrays have a row for each moving joint, called a step, and a row for each frame. As in the textbook,
-every joint frame is rotated so that the joint's axis is z (`turned` returns this rotation). Each revolute
-joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into the constant offsets between
-moving joints. A compiled tree contains only the joints that move one of its frames.
+A moving joint is called a step. Some of the arrays have one row for each step, and others have one row for
+each frame. As in the textbook, every joint frame is rotated so that the joint's axis is z (`turned` returns
+this rotation). Each revolute joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into
+the constant offsets between moving joints. A compiled tree contains only the joints that move one of its
+frames.
 
 The program consists of the instructions for each block of configurations. The instructions are chosen once
 for each robot. There are special instructions for a translation along a coordinate axis and for a rotation
@@ -43,7 +44,7 @@ class Step(IntEnum):
 
 
 class Motion(IntEnum):
-    """The kinds of a step: the values of column `Step.KIND`."""
+    """The kinds of moving joints: the values in the column `Step.KIND`."""
 
     TURN = 0
     SLIDE = 1
@@ -54,7 +55,8 @@ class Motion(IntEnum):
 class Geometry(IntEnum):
     """Columns of `CompiledTree.geometry`: a rotation R, an offset, and the joint's mimic rule.
 
-    The offset is in the axes of the previous step.
+    The offset leads from the previous moving joint to this joint; its components are in the previous joint's
+    axes.
     """
 
     R = 0
@@ -64,7 +66,7 @@ class Geometry(IntEnum):
 
 
 class Column(IntEnum):
-    """Columns of `CompiledTree.columns`; each row of that array describes a Jacobian column of eq. 7.85."""
+    """Integers that describe one Jacobian column (eq. 7.85): a row of `CompiledTree.columns`."""
 
     STEP = 0
     AXIS = 1
@@ -80,8 +82,8 @@ _MOTION = {
     JointKind.FLOATING: Motion.FLOATING,
 }
 
-#: For each joint velocity of a joint: the index of its axis in the joint's frame.
-#: The second value is True for a rotation about this axis, and False for a translation along it.
+#: The motions of a joint, for example two translations and a rotation for a planar joint. A motion is stored
+#: as the index of its axis in the joint's frame, and True for a rotation or False for a translation.
 _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
     Motion.TURN: ((2, True),),
     Motion.SLIDE: ((2, False),),
@@ -94,32 +96,35 @@ _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
 class CompiledTree:
     """The moving joints of a tree (the steps of the recursion) and the frames whose results are requested.
 
-    The steps are sorted from the base to the ends of the tree.
+    A joint comes after all joints between it and the base.
 
     Attributes:
         nq: Length of `q`.
         nv: Length of `v` and `a`.
-        joints: The moving joint of each step, as an index into the tree's joints.
+        joints: Indices of the moving joints in the tree's list of joints.
         steps: (steps, 3) integers, columns `Step`.
         geometry: (steps, 14), columns `Geometry`.
-        frames: (frames, 2) for each frame: the step before the frame (-1: the base), and the frame's index in
-            the output. The rows are sorted by step.
-        offsets: (frames, 12) rotation (9) and offset (3) from the frame of the step to each frame. The offset
-            is in the axes of the step.
-        columns: (columns, 4) a row for every joint velocity of every step; `Column` describes its numbers.
+        frames: (frames, 2) integers for each frame: the index of the last moving joint before the frame, and
+            the frame's index in the output. The first integer is -1 if no joint moves the frame. The array is
+            sorted by the first integer.
+        offsets: (frames, 12) rotation matrix (9 numbers) and translation (3 numbers) of each frame, relative
+            to the frame of its last moving joint.
+        columns: (columns, 4) integers for each Jacobian column, see `Column`. A planar joint has three
+            columns, and a floating joint has six.
         multipliers: (columns,) the mimic multiplier of each column.
-        leaders: (frames, columns) for each column: index of the first column on the path to the frame with
-            the same joint velocity. The columns of a joint and of its mimic joints have the same joint
-            velocity and are added. The index is -1 if the column's joint does not move the frame.
+        leaders: (frames, columns) index of the column to which a column is added. The columns of a joint and
+            of its mimic joints are added, because these joints have the same joint velocity. Their sum is
+            stored in the first of these columns on the path to the frame. The index is -1 if the column's
+            joint does not move the frame.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) for each step: index of the previous moving joint on the path from the base, or -1
             if there is none.
         lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including the offsets of
-            fixed joints. The first numbers are the lengths from the parent step to each step. The other
-            numbers are the lengths from the step to each frame (in the order of `frames`).
+            fixed joints. The first sums are from the previous moving joint to each moving joint. The other
+            sums are from the last moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
-        tilts: (frames,) sum (rad) of `Joint.tilt` over all URDF joints between the root and each frame, in
-            output order.
+        tilts: (frames,) the sum of the angles `Joint.tilt`, in rad, of all URDF joints between the root and
+            the frame. The frames are in the order of the output.
     """
 
     nq: int
@@ -231,7 +236,7 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """A link's last moving joint (-1: none), its pose in that joint's frame, and the path length."""
+    """The pose of a link relative to its last moving joint; `step` is -1 if no joint moves the link."""
 
     step: int
     T: FloatArray
@@ -294,8 +299,6 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
 
 def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
     """Return the array `CompiledTree.leaders`.
-
-    The argument `ends` has, for each frame, the last step before the frame.
     """
     leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
     rows = columns.tolist()
@@ -347,7 +350,7 @@ class Head(IntEnum):
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # start of the list of the needed blocks of eight coordinates
+    BLOCKS_Q = 4  # index of the list of blocks to read from q; a block is eight coordinates
     BLOCKS_V = 5
     BLOCKS_END = 6
     ANGLES = 7  # start of the list of joint angles
@@ -363,16 +366,18 @@ class Head(IntEnum):
 LANES = 8
 #: Number of integers in an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Each entry of the list of angles has this number of integers. The integers are: scratch row of the angle,
-#: scratch row of its sine, index of the mimic rule, and 1 or 0. The last integer is 1 if the joint has a
-#: mimic rule.
+#: A program describes each joint angle by this number of integers: the scratch row of the angle, the scratch
+#: row of its sine, and two integers about the mimic rule. The third integer is the index of the mimic rule in
+#: the constants. The fourth integer is 1 if the joint is a mimic joint, else 0.
 ANGLE_WIDTH = 4
-#: Scratch rows for the number 0, the number 1, the result of a frame, and a joint angle. `FIRST_ROW` is the
-#: first row for other numbers.
+#: The first rows of scratch memory have fixed uses: `ZERO_ROW` contains 0, and `ONE_ROW` contains 1. The
+#: results of a frame begin at `OUT_ROW`, and `ANGLE_ROW` contains a joint angle. Other numbers begin at
+#: `FIRST_ROW`.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Each Jacobian column in a list of pairs is described by this number of integers. The integers are: scratch
-#: row of the column, step of the joint, index in v, and scratch row of the sums.
+#: For a Hessian, the program describes each Jacobian column by this number of integers. The first integer is
+#: the scratch row of the column, and the second is the index of its moving joint. The third is the index of
+#: the joint's velocity in v. The fourth is the scratch row in which derivatives of the column are summed.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -388,7 +393,8 @@ class Program:
     """The program of a kernel.
 
     Attributes:
-        words: The integers of the program: the numbers of `Head`, then lists and instructions.
+        words: The program as integers: first the integers that `Head` names, then lists, for example of joint
+            angles, and then the instructions.
         constants: The constants of the instructions.
         rows: Number of rows of scratch memory that the program needs.
     """
@@ -404,7 +410,7 @@ class Program:
 
     @cached_property
     def lists(self) -> tuple[list[int], list[Number]]:
-        """`words` and `constants` as Python lists, for the recursion without a compiler."""
+        """Python lists of `words` and `constants`, which the recursion reads if it is not compiled."""
         words: list[int] = self.words.tolist()
         return words, list(map(Number, self.constants.tolist()))
 
@@ -416,8 +422,8 @@ def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs
 
     Args:
         plan: The compiled tree.
-        turned: Whether the state is rotated to the axes of each frame. Placements and results in the frame's
-            own axes need this rotation.
+        turned: Whether the program also computes the orientation of each frame. True is necessary for
+            placements, and for results in the frame's own axes.
         columns: Whether Jacobian columns are needed.
         pairs: Whether a separate column is stored for each joint, including mimic joints. Hessians are
             computed from pairs of these columns.
@@ -478,12 +484,13 @@ class _Writer:
                     c += 1
                 self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
-                now = -2  # the current state is now the state of the frame
+                now = -2  # the registers now contain the state of the frame, not of a joint
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """Yield (previous step, step, None) for each step, and (previous step, None, frame) for each frame.
+        """Yield the moving joints and frames in the order in which the recursion visits them.
 
-        The order is that of the recursion.
+        An item is (index of the previous joint, index of the joint, None), or (index of the previous joint,
+        None, index of the frame).
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -494,10 +501,10 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Write an instruction that saves the state after a step, if the state is needed again later.
+        """Write an instruction that saves the state after a joint, if the state is needed again later.
 
-        `last` has, for each step, the index of the last event that needs the state after this step. The state
-        is saved if this index is above `following`.
+        `last[i]` is the index of the last event that uses the state after joint i. The event with index
+        `following` comes next and uses the state in the registers, so only later events need the saved state.
         """
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
@@ -514,9 +521,9 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write the instructions for a translation by p and a rotation by R; return whether there are any.
+        """Write the instructions for a translation by p and a rotation by R.
 
-        A translation by zero and a rotation by the identity need no instruction.
+        Return False if no instruction is needed, that is, if p is zero and R is the identity.
         """
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
@@ -529,9 +536,9 @@ class _Writer:
         return len(self.code) > before
 
     def _rule(self, i: int) -> int:
-        """Return the index in `constants` of a mimic joint's multiplier, which its offset follows.
+        """Store a mimic joint's multiplier and offset in `constants`, and return the index of the multiplier.
 
-        For other joints, the result is 0.
+        For other joints, return 0.
         """
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
@@ -539,7 +546,7 @@ class _Writer:
     def _angles(self) -> list[int]:
         """Return the list of joint angles.
 
-        The list has an entry of `ANGLE_WIDTH` numbers for each step with a rotation.
+        Each angle of a revolute or planar joint is described by `ANGLE_WIDTH` integers.
         """
         angles = []
         for i, step in enumerate(self.plan.steps):
@@ -561,9 +568,9 @@ class _Writer:
         self._put(op, first, int(step[Step.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
 
     def _frame(self, f: int) -> bool:
-        """Write the instructions that write a frame's results.
+        """Add the instructions for the results of a frame to the program.
 
-        Return True if these instructions replace the current state by the state of the frame.
+        Return True if these instructions overwrite the joint's state in the registers with the frame's state.
         """
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
@@ -598,7 +605,7 @@ class _Writer:
         return found
 
     def _pairs(self, f: int) -> list[int]:
-        """Return integers that tell the kernel where the Jacobian columns for a frame's Hessian are.
+        """Return the list of Jacobian columns from which the kernel computes a frame's Hessian.
 
         The first integer is the number of columns. `PAIR_WIDTH` integers for each column follow. The last
         integers are the scratch memory rows with the elements of the result.
@@ -617,7 +624,10 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _blocks(places: Sequence[int]) -> list[int]:
-    """Return the first index of each block of eight indices that contains at least one of `places`."""
+    """Return the first index of each block of eight that contains one of the given indices.
+
+    For example, the indices 3 and 17 are in the blocks that begin at 0 and 16.
+    """
     return sorted({int(place) // 8 * 8 for place in places})
 
 
@@ -632,9 +642,9 @@ REFERENCES = {
 
 
 class KernelArgs(IntEnum):
-    """Index of each argument in the row of integers.
+    """Indices of the integers with which a kernel is called.
 
-    Only calls with one configuration use the arguments from CORE to the last.
+    The integers from CORE on are used only for calls with one configuration.
     """
 
     @staticmethod

@@ -38,8 +38,8 @@ _SAVED = 5e-5
 #: Seconds after which the cache folder is searched again for a kernel that it did not contain.
 _AGAIN = 0.05
 
-#: Modules that contain the kernels. `load_kernels` compiles the kernels of `_ONE_HALF` and `_OTHER_HALF` in
-#: two processes, so both groups take equally long.
+#: Modules that contain the kernels. `load_kernels` compiles the kernels `_ONE_HALF` in one process and the
+#: kernels `_OTHER_HALF` in another process. The compile times of these two groups are about equal.
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
@@ -57,7 +57,7 @@ _only: list[Way] = []
 
 @contextmanager
 def only(way: Way) -> Iterator[None]:
-    """Compute everything in the given way while the context is open.
+    """While the context is open, always compute with kernels, or always compute without kernels.
 
     A test can thus compare results of Python numbers with results of kernels.
     """
@@ -98,7 +98,8 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 def single_pays(name: str) -> bool:
     """Return whether to load the fast function (`SINGLE`) that calls the kernel `name` for one configuration.
 
-    Each call of `single_pays` counts as a call that the fast function would have accelerated.
+    Call this function once for each call of the user: it adds up the time that the fast function would have
+    saved.
     """
     if _only:
         return _only[-1] == "compiled"

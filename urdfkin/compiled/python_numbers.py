@@ -17,9 +17,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows.
-#: With N joints, the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2.
-#: The largest product, w^2 d, is therefore below N^3 LARGE^6.
+#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows. For N
+#: joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2. An angular
+#: velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
@@ -155,9 +155,9 @@ class Product:
 
 
 class Known:
-    """The constant 0, the constant 1, or a number that is not needed.
+    """A number that simplifies products: the constant 0, the constant 1, or the unused number `nothing()`.
 
-    For a number that is not needed, `value` is None.
+    The attribute `value` of the unused number is None.
     """
 
     __slots__ = ("value",)
@@ -237,7 +237,10 @@ def number(s: Sequence[Number], row: int) -> Number:
 
 
 def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
-    """Return the number in a row of scratch memory; if `wanted` is `nothing()`, return `nothing()`."""
+    """Return the number in a row of scratch memory, or `nothing()` if the caller does not need the number.
+
+    The caller then passes `nothing()` as the argument `wanted`.
+    """
     return wanted if wanted is _NOTHING else s[row]
 
 
@@ -281,7 +284,7 @@ def write_rows(
 ) -> None:
     """Write `count` rows of scratch memory to the list `to`, from `to[at]` on.
 
-    The list `rows` has the indices of the rows, from `rows[first]` on.
+    The indices of these rows are `rows[first]`, `rows[first + 1]` and so on.
     """
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
@@ -292,7 +295,7 @@ def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Numbe
 
 
 def ordinary(total: Number) -> bool:
-    """Return whether a sum of squares is below the square of `LARGE`; it is not if a number was nan."""
+    """Return whether a sum of squares is below the square of `LARGE`; for nan, return False."""
     return total.x < LARGE * LARGE
 
 

@@ -91,7 +91,10 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return the state of the same body for a frame that is rotated by S."""
+    """Return the state of a link after the axes of the link's frame are rotated by S.
+
+    The link's motion does not change.
+    """
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -241,7 +244,7 @@ def _save(s, row, state):
 
 
 def _resume(s, row, state):
-    """Return a saved state, but without the parts that this recursion does not need."""
+    """Read a link's state from scratch memory; read only the vectors that are needed."""
     R, p, w, vel, alpha, acc = state
     return (
         (_vector_if(R[0], s, row), _vector_if(R[1], s, row + 3), _vector_if(R[2], s, row + 6)),
@@ -257,7 +260,9 @@ def _resume(s, row, state):
 
 
 def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
-    """Read the needed blocks of eight numbers of `m` configurations, from configuration b on.
+    """Read numbers of `m` configurations from x into scratch memory; the first configuration has index b.
+
+    A configuration consists of blocks of eight numbers, and only the listed blocks are read.
 
     If x has one row, all configurations use this row. A block of eight numbers is read faster than a shorter
     block. If a configuration ends within a block, numbers of the next configuration are therefore read too,
@@ -275,7 +280,7 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
 def _start(axes, m, s, task, row, b):
     """Return the initial state of the recursion, which is the base's motion in the world.
 
-    In the textbook, this is the motion of frame 0 relative to frame -1.
+    The textbook calls the base frame 0 and the world frame -1.
     """
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
@@ -325,8 +330,10 @@ def _along_link(axes, op, state, g, c):
 def _over_joint(axes, op, state, s, x, v, a, z, g, c):
     """Execute a joint's instruction.
 
-    The operands of the instruction are x, z and c. The arguments v and a are the scratch rows of the joint's
-    velocity and acceleration.
+    The arguments v and a are the scratch rows of the joint's velocity and acceleration. For a revolute joint,
+    x is the scratch row of the sine; for other joints, x is the scratch row of the first coordinate. For a
+    planar joint, z is the scratch row of the sine; for other joints, z is 1 for a mimic joint and 0
+    otherwise. The constants of a mimic rule begin at `g[c]`.
     """
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)

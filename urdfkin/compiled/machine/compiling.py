@@ -8,9 +8,8 @@ folder is writable, nothing is cached.
 
 Parts. A *part* is a function that only kernels call, never Python. The compiler inlines a part into each
 kernel that calls it. A part therefore needs no machine code of its own, and no optimization before it is
-inlined. The source code of parts uses only some features of Python. Compiler passes for other features are
-skipped, for example the passes for closures and for array expressions. Skipping all these steps halves the
-compile time.
+inlined. Parts use no closures and no array expressions. The compiler passes for such unused features of
+Python are therefore skipped. Skipping all these steps halves the compile time.
 """
 
 from __future__ import annotations
@@ -94,9 +93,7 @@ _register: Any = register_pass
 
 
 class _Part(_Library):  # type: ignore[misc]
-    """The LLVM code of a part.
-
-    The code of a part is linked into a kernel, with the code of all functions that the part calls.
+    """The LLVM code of a part, that is, of a function that only kernels call.
     """
 
     def finalize(self) -> None:
@@ -295,7 +292,7 @@ class Core(Kernel):
 
 
 def core(function: Callable[..., int]) -> Core:
-    """Return the compiled form of a function whose arguments are addresses and other integers.
+    """Return a compiled version of a function whose arguments are integers, for example memory addresses.
 
     The function is compiled at the first call and cached on disk.
     """

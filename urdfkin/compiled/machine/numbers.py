@@ -7,8 +7,8 @@ fused multiply-add, which is rounded once. This module, and not the compiler, de
 fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
-sum with zero, costs no time. If z = (0, 0, 1) is written with these numbers, the equations for any axis
-simplify to the equations for the axis z. `nothing()` stands for a number that is not needed. A result
+sum with zero, costs no time. If the axis is `(zero(), zero(), one())`, the compiler therefore simplifies the
+equations for any axis to those for the z axis. `nothing()` stands for a number that is not needed. A result
 computed from `nothing()` is also `nothing()` and costs no time.
 """
 
@@ -143,7 +143,10 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether each type is a type of this module or an integer, such as the 2 in 2 w x u."""
+    """Return whether each type is one of this module's number types or an integer type.
+
+    Equations contain integers as factors, for example the 2 in 2 (w x u).
+    """
     ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
