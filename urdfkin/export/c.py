@@ -136,7 +136,7 @@ def _function(code: Code, function: Function) -> str:
 
 
 def spare(code: Code, function: Function) -> int:
-    """Return the number of rows in which every input and the result have at least eight numbers."""
+    """Return the smallest number of configurations for which every array has at least eight numbers."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
@@ -162,7 +162,10 @@ class Layout:
         self.room = max(1, self.first + 3 * len(self.angles))
 
     def place(self, node: Node) -> int:
-        """Return the index in the array `in` of an input, an angle, a sine or a cosine."""
+        """Return the position of a value in the array `in`.
+
+        The value is an input, an angle, or the sine or cosine of an angle.
+        """
         if node.op in ("sin", "cos"):
             return self.place(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
@@ -252,7 +255,10 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main(code: Code, *frames: str) -> str:
-    """Return the text of a program that runs the test vectors, once for each frame of a check."""
+    """Return the text of a program that runs the test vectors.
+
+    The arguments `frames` are names of template files, for example "check_one.c".
+    """
     checks = (_check(code, function, frame) for function in code.functions for frame in frames)
     return framed("check.c", checks="".join(checks))
 

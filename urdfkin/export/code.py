@@ -1,4 +1,4 @@
-"""The language-independent form of an export: the functions of one frame, their names and their proof."""
+"""The exported functions of one frame, before they are written in a programming language."""
 
 from __future__ import annotations
 
@@ -32,18 +32,22 @@ class Code:
 
     Attributes:
         name: Prefix of the names of functions.
-        robot: The robot's name. All names in this class are safe in a comment.
+        robot: The robot's name. A name in this class contains no characters that end a comment in the
+            exported file.
         frame: The frame's name.
         reference: The reference frame.
         functions: One function for each quantity.
         coordinates: Names of the coordinates of q.
         rates: Names of the coordinates of v and a.
         joints: Names of the path's moving joints.
-        words: Identifiers for the numbers of each input, by the input's letter, and for the path's joints.
-        about: Lines for the header that describe the table or the screws of the chain; empty for a URDF.
-        vouched: The proof; None for code that urdfkin compiles for itself.
-        exact: Function that returns the same code with exact constants; None if there is none, or if the
-            constants are exact.
+        words: Identifiers in the exported code. The keys "q", "v" and "a" have a list of identifiers for the
+            numbers of the input. The key "s" has a list of identifiers for the path's joints.
+        about: Lines of the file's header that contain the Denavit-Hartenberg table or the screws; empty for
+            code from a URDF's joints.
+        vouched: The comparison with Pinocchio and the test vectors; None for code that urdfkin compiles for
+            its own use.
+        exact: Function that returns this code with fractions instead of doubles as constants. None if there
+            is no such code, or if the constants are already exact.
     """
 
     name: str
@@ -61,7 +65,7 @@ class Code:
 
     @property
     def proof(self) -> Proof:
-        """The proof of the functions."""
+        """The comparison of the functions with Pinocchio, and the test vectors."""
         if self.vouched is None:
             raise ValueError("code that was not verified is not exported")
         return self.vouched
@@ -114,17 +118,17 @@ def code_of(
     verify: bool | None,
     about: str = "",
 ) -> Code:
-    """Make the code of a frame, with its proof.
+    """Return the code of a frame with test vectors and with the result of the comparison with Pinocchio.
 
     Args:
         verifier: Verifier of the robot.
-        plan_of: Function that returns the compiled tree for some links.
+        plan_of: Function that returns the compiled tree of the joints that move the given links.
         frame: Name of a link or joint.
         quantities: Names of quantities.
         reference: Reference frame of velocities, accelerations and Jacobians.
-        name: Prefix of the names of functions; None: made of the names of the robot and the frame.
+        name: Prefix of the function names. None: the prefix consists of the names of the robot and the frame.
         verify: As in `Robot.export`.
-        about: Text about the table or the screws of the chain, for the header.
+        about: Text for the file's header: the Denavit-Hartenberg table or the screws.
 
     Raises:
         UnknownNameError: the frame, a quantity or the reference is unknown.
@@ -164,7 +168,7 @@ def bare(
     reference: Reference,
     name: str,
 ) -> Code:
-    """Make the code of a frame without a proof."""
+    """Return the code of a frame without test vectors and without a comparison with Pinocchio."""
     coordinates, rates = coordinate_names(tree), rate_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
     return Code(
@@ -278,9 +282,9 @@ class Writer:
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return the text of an expression in terms of inputs only, without the names of statements.
+        """Return the text of an expression that contains inputs and constants, but no other variables.
 
-        Angles need this form, because the code computes them before its statements.
+        Angles are written like this, because the exported code computes angles before it assigns variables.
         """
         if not isinstance(x, Node):
             return self.literal(float(x))

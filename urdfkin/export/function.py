@@ -27,7 +27,7 @@ from urdfkin.verify.quantities import Quantity
 
 #: Letters of the inputs.
 INPUTS = ("q", "v", "a")
-#: Operations that always become statements of their own.
+#: Operations whose result the exported code always assigns to a variable.
 _ALWAYS = ("sin", "cos", "sqrt", "/")
 #: Largest number of operations in a statement.
 _LONGEST = 12
@@ -103,7 +103,7 @@ class Function:
     def within(self, leaves: Collection[str]) -> set[Node]:
         """Return the expressions that the results need.
 
-        The operands of the operations in `leaves` are left out.
+        The operands of an operation in `leaves` are not included.
         """
         waiting, found = [x for x in self.results if isinstance(x, Node)], set[Node]()
         while waiting:
@@ -161,7 +161,7 @@ def function_of(
         plan: The compiled tree of the path.
         quantity: A quantity that can be exported.
         reference: The reference frame.
-        graph: The graph that contains exact constants of the compiled tree. None: the constants are doubles.
+        graph: The graph in which the tree's exact constants were created. None: the constants are doubles.
     """
     graph = graph or Graph()
 

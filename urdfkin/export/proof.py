@@ -67,7 +67,7 @@ class Vector:
 
 @dataclass(frozen=True)
 class Proof:
-    """The proof of an exported file.
+    """The checks of an exported file: test vectors and the comparison with Pinocchio.
 
     Attributes:
         sha256: SHA-256 of the URDF's text.
@@ -98,7 +98,7 @@ class Proof:
 
     @property
     def lines(self) -> list[str]:
-        """The proof in words."""
+        """Lines of text for the file's header that describe the checks."""
         oracle = quiet(self.certificate.oracle)
         if not self.certificate.verified:
             reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"

@@ -30,13 +30,13 @@ class Kind:
     """A kind of number.
 
     Attributes:
-        chapter: A module with the textbook's equations, which compute with numbers of this kind.
+        chapter: A module with the textbook's equations as functions that accept numbers of this kind.
         sine_cosine: Function that returns sine and cosine of an angle.
         root: Function that returns the square root.
-        entering: Function that is called before each step, then before the final frame, and then before the
-            results. Its argument counts these calls from 0.
-        reached: Function that is called after each step and after the final frame. Its arguments are the
-            index of the call and the new state.
+        entering: Function that the recursion calls at each joint, at the final frame, and before the results.
+            The argument of the function is the number of earlier calls.
+        reached: Function that the recursion calls after each joint and after the final frame. The arguments
+            of the function are the number of earlier calls and the new state.
     """
 
     chapter: Any
@@ -52,7 +52,7 @@ class TreeRecursion(Recursion):
     Args:
         plan: The compiled tree of one frame.
         kind: The kind of number.
-        inputs: q, v and a; zeros where they are not needed.
+        inputs: q, v and a. An input that is not needed consists of zeros.
         own: Whether the motion of each link is computed in the axes of the link's own frame.
 
     Attributes:
@@ -81,7 +81,7 @@ class TreeRecursion(Recursion):
         kind.entering(len(self.states) + 1)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Rotate the frame of a state by S, and append S to `turns`."""
+        """Rotate the axes of a link's frame by S, and add the rotation to the list `turns`."""
         self.turns.append(S)
         return super().turned(s, S)
 

@@ -65,9 +65,10 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def reach(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives of the results `columns` with respect to x.
+        """Add `slope` to the derivatives, with respect to x, of the results with indices `columns`.
 
-        If x is a constant, add the effect of its error to the bounds of these results.
+        If x is a constant, add its rounding error, multiplied by `slope`, to the bounds of these results
+        instead.
         """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant(x)
@@ -93,7 +94,7 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
 def _own(node: Node, x: FloatArray) -> FloatArray:
     """Return the rounding error (n,) of one operation with exact operands, in eps.
 
-    The results of the operation are x (n,).
+    The array x contains the results of the operation for n configurations.
     """
     size = np.abs(x)
     if node.op in INPUTS:

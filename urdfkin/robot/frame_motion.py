@@ -34,7 +34,7 @@ class Check:
     Attributes:
         units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
             Here eps is the machine epsilon, and scale is the size of the quantity's numbers.
-        share: (n,) `units` divided by `bound`; a value above 1 is a failure.
+        share: (n,) the difference as a fraction of its bound; the check fails if a value is above 1.
         bound: (n,) largest difference that rounding can cause, divided by eps * scale.
     """
 

@@ -332,7 +332,7 @@ def robot_of(
         joints: As in `load`.
         listed: Findings about the original source, if the text was generated from another format.
         made: Whether the text was generated, so that no file contains it.
-        table: Whether the original source is a table.
+        table: Whether the robot was given as a Denavit-Hartenberg table or a product of exponentials.
         quiet: Whether to issue no warnings.
 
     Raises:

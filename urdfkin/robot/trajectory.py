@@ -211,7 +211,7 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
         robot: The robot.
         start: (nq,) rad, m.
         end: (nq,) rad, m. A continuous joint moves by `end - start`, also if this is more than one turn.
-            Planar and floating joints make no whole turn.
+            Planar and floating joints turn by at most half a turn.
         duration: Seconds.
         samples: Number of samples, including both ends.
 
@@ -241,7 +241,8 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # In a screw motion, the velocity and the acceleration in the moving frame are s' and s'' times `step`.
+    # The joint velocities are `step` times s', and the joint accelerations are `step` times s''. The same is
+    # true for screw motions, because their velocities are expressed in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -400,7 +401,11 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return the unit of each number of "q", "v" or "a" by the number's name: "rad", "m/s", ... or ""."""
+    """Return a dictionary from the names of coordinates or joint velocities to units such as "rad" or "m/s".
+
+    The argument `letter` selects coordinates ("q"), joint velocities ("v") or joint accelerations ("a"). The
+    unit of a quaternion's component is "".
+    """
     layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -527,7 +532,8 @@ _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: Patterns of a unit at the end of a heading, as in `v:elbow_deg_s`, `a:elbow_rad_per_s2` and `elbow_deg`.
+#: Regular expressions for CSV column names that end with a unit, for example `v:elbow_deg_s`,
+#: `a:elbow_rad_per_s2` and `elbow_deg`.
 _SUFFIXES = (
     re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
     re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
@@ -773,7 +779,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Unwrapping adds whole turns to a joint's angle. Yield a note for each mimic joint that this changes."""
+    """Yield a note for each mimic joint that moves if whole turns are added to its mimicked joint."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):

@@ -37,7 +37,7 @@ TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
 #: Okabe and Ito's colours, distinguishable with every colour vision deficiency. Some readers see no colours.
-#: Therefore each difference in colour is also a difference in sign, line style or position.
+#: Therefore lines with different colours also differ in line style, sign or position.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip

@@ -249,8 +249,8 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 _PAGE = (7.6, 10.4)
 #: Height of a panel, and of title and footer together, in inches.
 _HEIGHT, _WORDS = 2.1, 0.9
-#: Three numbers for the layout of text: letters per inch in the footer, letters per inch in a legend, and the
-#: width of a legend's line marker in letters.
+#: Numbers for the layout of text: letters per inch in the footer and in a legend. The sample line in a legend
+#: is as wide as `_HANDLE` letters.
 _LETTERS, _LETTERS_OF_LEGEND, _HANDLE = 16, 22, 8
 #: Sentence for the footer of a figure if v and a were not computed exactly from q.
 _RATES_UNCHECKED = (

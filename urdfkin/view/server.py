@@ -279,7 +279,7 @@ def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[
 
 
 def _page() -> Callable[[str], bytes]:
-    """Return a function that returns viser's page, a single file, with a given nonce."""
+    """Return a function that creates viser's page for a nonce, which is a random key of the page."""
     import viser  # noqa: PLC0415  an extra
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
@@ -291,7 +291,8 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD) != 1:
         raise UnguardedError("the page of viser has no <head> element")
-    # Our script comes first: it names the controls, follows the browser's theme, and runs before viser's.
+    # urdfkin's script is inserted before viser's script, and therefore runs first. It names the controls and
+    # follows the browser's theme.
     ours = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:

@@ -414,14 +414,15 @@ class Stage:
 
 
 def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return three points for each row of the table, as three arrays (rows, 3).
+    """Return the points between which a Denavit-Hartenberg table is drawn, as three arrays (rows, 3).
 
-    A row is drawn as two segments, d and a. The points are the start of the first segment, the common point,
-    and the end of the second segment.
+    Each row of the table is drawn as two straight lines, which have the lengths d and a. The arrays contain
+    the starts of the first lines, the common points of both lines, and the ends of the second lines.
     """
     starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
     if str(table.convention) == "standard":
-        # d along the previous z axis, then a along the new x axis.
+        # In the standard convention, d comes first and lies on the previous z axis. The length a comes next
+        # and lies on the new x axis.
         a = np.array([row.a for row in table.rows]).reshape(-1, 1)
         return starts, ends - a * frames[1:, :3, 0], ends
     a = np.array([row.a for row in table.rows]).reshape(-1, 1)

@@ -93,8 +93,7 @@ _register: Any = register_pass
 
 
 class _Part(_Library):  # type: ignore[misc]
-    """The LLVM code of a part, that is, of a function that only kernels call.
-    """
+    """The LLVM code of a part, that is, of a function that only kernels call."""
 
     def finalize(self) -> None:
         """Mark the library as finished without generating machine code."""
