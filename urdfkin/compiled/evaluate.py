@@ -44,9 +44,11 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Results of at least this size (bytes) are written directly to memory, because the caches are too small.
+#: If the results have at least this number of bytes, they are written to memory and not to the caches, which
+#: are too small.
 _STREAMED = 2 << 20
-#: Number of values in a block of results. A block fits into half of the processor's first-level cache.
+#: Largest number of doubles in the buffer of results. A full buffer fills half of the processor's first-level
+#: cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -183,8 +185,8 @@ def _interpreted(
 ) -> int | None:
     """Compute a batch with Python numbers; return None, without a result, if a kernel is faster.
 
-    Otherwise return 1 if an input is nan, infinite or too large, else 0. The function measures the processor
-    time of each configuration, and estimates from it whether a kernel is faster.
+    After a computation, return 1 if an input is nan, infinite or too large, and 0 otherwise. The function
+    measures the processor time of each configuration, and estimates from it whether a kernel is faster.
     """
     if preload.kernel(name) is not None:
         return None
@@ -366,7 +368,8 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
     """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
     Args:
-        compute: Computes the rows of a slice. For an empty batch it is called once, with an empty slice.
+        compute: Computes the rows of a slice. For an empty batch, this function is called once, with an empty
+            slice.
         n: Number of rows.
         threads: Largest number of threads, as in `in_blocks`.
 

@@ -12,8 +12,8 @@ about a coordinate axis. These instructions take a third of the time of the gene
 translation by zero needs no instruction. The state of a link stays in registers until the next link is
 computed. At a branch of the tree, the state is saved to memory and read again later.
 
-`KernelArgs` names the arguments of a kernel. The arguments of a kernel are one row of integers: addresses,
-sizes and options.
+`KernelArgs` names the arguments of a kernel. All arguments of a kernel are integers: memory addresses,
+lengths and options.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class CompiledTree:
-    """The moving joints of a tree (the steps of the recursion) and the frames whose results are requested.
+    """The moving joints and the frames that a computation needs, stored in arrays.
 
     A joint comes after all joints between it and the base.
 
@@ -117,8 +117,8 @@ class CompiledTree:
             stored in the first of these columns on the path to the frame. The index is -1 if the column's
             joint does not move the frame.
         places_q: Indices of the coordinates that the recursion needs.
-        parents: (steps,) for each step: index of the previous moving joint on the path from the base, or -1
-            if there is none.
+        parents: (steps,) for each moving joint: the index of the previous moving joint on the path from the
+            base. The index is -1 for the first moving joint on a path.
         lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including the offsets of
             fixed joints. The first sums are from the previous moving joint to each moving joint. The other
             sums are from the last moving joint to each frame, in the order of `frames`.
@@ -218,7 +218,9 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return the links on the paths to the given links, root first, each with the number of joints before it.
+    """Return a dictionary of the links on the paths to the given links.
+
+    The value of a link is the number of joints between the root and the link.
 
     Each joint is visited once. A separate path for each link would take time proportional to the tree's
     depth.
@@ -258,7 +260,8 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 
 def turned(joint: Joint) -> FloatArray:
-    """Return the pose (4, 4), in the joint's URDF frame, of a frame whose z axis is the joint's axis."""
+    """Return the pose (4, 4) of a frame whose z axis is the joint's axis, relative to the joint's URDF
+    frame."""
     A = np.eye(4)
     if joint.kind.has_axis:
         A[:3, :3] = axis_aligning(joint.axis)
@@ -319,7 +322,8 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 class Op(IntEnum):
     """The instructions of a program.
 
-    An instruction with an axis has four forms, in this order: for the axis x, y, z, and for any axis.
+    For a translation or rotation there are four instructions: for the x axis, the y axis, the z axis, and any
+        axis.
     """
 
     END = 0
@@ -343,7 +347,7 @@ class Op(IntEnum):
 
 
 class Head(IntEnum):
-    """Positions of the numbers at the beginning of a program, before its instructions."""
+    """Indices of the integers at the beginning of a program, before the instructions."""
 
     CODE = 0  # index of the first instruction
     NQ = 1
@@ -360,10 +364,11 @@ class Head(IntEnum):
     BASE = 12  # first scratch row of the state of the base
 
 
-#: Number of configurations in a row of scratch memory.
-#: A row fills one AVX-512 register or two AVX2 registers.
+#: Number of doubles in a row of scratch memory: one double for each of eight configurations. A row fills one
+#: AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers in an instruction: the operation, three operands, and the index of its constants.
+#: Number of integers in an instruction: the code of the operation, three operands, and the index of the
+#: instruction's constants.
 WIDTH = 5
 #: A program describes each joint angle by this number of integers: the scratch row of the angle, the scratch
 #: row of its sine, and two integers about the mimic rule. The third integer is the index of the mimic rule in
@@ -424,8 +429,8 @@ def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs
         turned: Whether the program also computes the orientation of each frame. True is necessary for
             placements, and for results in the frame's own axes.
         columns: Whether Jacobian columns are needed.
-        pairs: Whether a separate column is stored for each joint, including mimic joints. Hessians are
-            computed from pairs of these columns.
+        pairs: Whether a separate column is stored for each joint, including mimic joints. A Hessian is
+            computed from all pairs of Jacobian columns.
     """
     key = turned, columns, pairs
     made: Program | None = plan.made.get(key)
@@ -500,7 +505,7 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Write an instruction that saves the state after a joint, if the state is needed again later.
+        """If the state after a joint is needed again later, write an instruction that saves the state.
 
         `last[i]` is the index of the last event that uses the state after joint i. The event with index
         `following` comes next and uses the state in the registers, so only later events need the saved state.
@@ -630,11 +635,11 @@ def _blocks(places: Sequence[int]) -> list[int]:
     return sorted({int(place) // 8 * 8 for place in places})
 
 
-#: Size of a cache line of the processor, bytes.
-#: Access to a vector that lies across two cache lines takes twice as long.
+#: Size of a cache line of the processor, bytes. If a vector is partly in one cache line and partly in the
+#: next, access to the vector takes twice as long.
 _LINE = 64
-#: The reference frames that the kernels support, each with its number in a kernel.
-#: Any other reference frame raises a KeyError.
+#: The reference frames that the kernels support, with the integers that represent them in a kernel. Any other
+#: reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
@@ -660,8 +665,8 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Distance in memory between the first numbers of two consecutive configurations.
-    #: The distance is 0 if all configurations use the same numbers.
+    #: Number of doubles from the first number of a configuration to the first number of the next one. This
+    #: number is 0 if all configurations use the same numbers.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 LOADING, COMPILING = 0.3, 3.0
 #: When computing without a kernel has taken this many seconds, a second process compiles the kernel.
 BESIDE = 1.0
-#: If another kernel is loaded already, this limit (s) replaces `LOADING`.
+#: Limit (s) that is used instead of `LOADING` after the first kernel is loaded.
 _LOADING_MORE = 0.03
-#: Seconds that a call for one configuration saves if it uses the fast function.
+#: Seconds that the fast function saves for each call with one configuration.
 _SAVED = 5e-5
 #: Seconds after which the cache folder is searched again for a kernel that it did not contain.
 _AGAIN = 0.05
@@ -46,7 +46,7 @@ _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
 # -- when a kernel pays ----------------------------------------------------------------------------------
 
-#: The way to compute: with Python numbers, or with a compiled kernel.
+#: How to compute: "interpreted" with Python numbers, or "compiled" with kernels.
 Way = Literal["interpreted", "compiled"]
 
 _spent: dict[str, float] = {}
@@ -147,8 +147,8 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 def _compile_beside(name: str, home: str) -> bool:
     """Start a second process that compiles a kernel, and return whether such a process runs.
 
-    Only one second process runs at a time, and there is only one attempt for each kernel. The result is also
-    True while the second process compiles another kernel.
+    At most one such process runs at a time, and it is started at most once for each kernel. The function also
+    returns True while the second process compiles another kernel.
     """
     if cache_folder() is None:
         return False
@@ -219,8 +219,8 @@ def load_kernels() -> None:
     """Compile every kernel, or read it from disk.
 
     Call this function before you start several processes; otherwise each of them compiles the kernels. A
-    process compiles on one processor only. A second process therefore compiles half of the kernels, and this
-    process then reads that half from disk.
+    process compiles on one processor only. Therefore, a second process compiles half of the kernels.
+    Afterwards, this process reads those kernels from disk.
     """
     missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
     helper = _compile_elsewhere(_OTHER_HALF) if missing else None

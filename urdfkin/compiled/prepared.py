@@ -1,9 +1,9 @@
 """Compute results of one frame for one configuration in fast calls, for control loops and solvers.
 
-The recursion is the same as for the methods of `Robot`. The kernel computes eight configurations at a time,
-and here all eight are the same configuration. Each function is bound to a program and to scratch memory, so a
-call passes only the arrays. If another thread is using the same function, the call uses `Robot` instead, with
-the same result.
+The recursion is the same as for the methods of `Robot`. A kernel computes eight configurations at a time;
+here, all eight are the same configuration. Each function has its own program and its own scratch memory, so
+the caller passes only the arrays. If another thread is using the function, `Robot` computes the same result
+instead.
 """
 
 from __future__ import annotations
@@ -83,8 +83,8 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether the user created this object with `Robot.prepare`.
-        #: If so, the first call compiles machine code.
+        #: Whether the user created this object with `Robot.prepare`. For such an object, the first call
+        #: compiles machine code.
         self.wanted = False
         # At the first call of a quantity, `_first` replaces the quantity's attribute by a compiled function.
         self._placement: Fast = partial(self._first, "placement")
@@ -168,7 +168,8 @@ class PreparedFrame:
 
         Return None if the function would save less time than its creation takes.
         """
-        # `Robot` must normalise quaternions, and must check the results of large robots for overflow.
+        # The fast function neither normalises quaternions nor checks for overflow, so `Robot` computes these
+        # cases.
         robots = self._robot.tree.floating_joints or self._plan.is_large
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1):
             return None

@@ -1,10 +1,9 @@
 """Number types with which Python runs the recursion without a compiler, for one configuration at a time.
 
 Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A
-product is
-stored as its two factors until it is added: x y + z is then one fused multiply-add, rounded once. `zero()`
-and `one()` are the constants 0 and 1. `nothing()` stands for a number that is not needed. Every number
-computed from `nothing()` is also `nothing()`.
+product x y is not computed at once. In the sum x y + z, the product and the sum are one fused multiply-add,
+which is rounded only once. `zero()` and `one()` are the constants 0 and 1. `nothing()` stands for a number
+that is not needed. Every number computed from `nothing()` is also `nothing()`.
 
 Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel takes
 addresses.
@@ -24,8 +23,8 @@ LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: The sum of this constant and a number below 2^51 is rounded to an integer. The lowest bits of the sum's
-#: mantissa are the number rounded to the nearest integer.
+#: If this constant is added to a number below 2^51, the sum is rounded to an integer. The lowest bits of the
+#: sum's mantissa are the integer nearest to the number.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -260,12 +259,12 @@ same = Number
 
 
 def numbers_of(array: Any) -> Any:
-    """Return the numbers of an array; in interpreted code the array is already a list of numbers."""
+    """Return the numbers of an array as a list; compiled code uses a pointer to the numbers instead."""
     return array.tolist()
 
 
 def numbers_at(address: Any) -> Any:
-    """Return the list of numbers that interpreted code passes instead of an address."""
+    """Return the argument, which is a list of numbers; compiled code has an address instead of a list."""
     return address
 
 
@@ -275,7 +274,7 @@ whole_numbers_at = numbers_at
 def read_rows(
     m: int, x: Sequence[float], at: int, stride: int, count: int, s: list[Number], row: int
 ) -> None:
-    """Read `count` numbers from the list x, from `x[at]` on, into rows of scratch memory."""
+    """Copy the numbers `x[at]`, `x[at + 1]` and so on to `count` rows of scratch memory."""
     s[row : row + count] = map(Number, x[at : at + count])
 
 

@@ -89,7 +89,7 @@ def constant(context: Any, g: Any, i: Any) -> Any:
 
 @intrinsic
 def same(context: Any, x: Any) -> Any:
-    """Return the double x as a number with the same value for all configurations."""
+    """Return a vector in which the double x is repeated for all eight configurations."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, arguments[0], LANES)
@@ -101,7 +101,7 @@ def same(context: Any, x: Any) -> Any:
 def numbers_of(context: Any, array: Any) -> Any:
     """Return a pointer to an array's numbers.
 
-    Unlike the array, the pointer does not test for negative indices.
+    An index into a pointer must not be negative, so compiled code need not test the sign of the index.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -121,12 +121,12 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: The first function returns a pointer to the doubles at an address.
-#: The second function returns a pointer to the integers at an address.
+#: `numbers_at` converts an address to a pointer to doubles. `whole_numbers_at` converts an address to a
+#: pointer to integers.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Largest number of doubles that are prefetched. They fill half of a processor's first-level cache.
+#: Largest number of doubles that are prefetched. These doubles fill half of a processor's first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 
@@ -299,7 +299,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 def fetch(x, at, count):
     """Load `count` numbers from `x[at]` on into the cache.
 
-    The numbers are the inputs of the next block, which are loaded while this block is computed.
+    While one block of configurations is computed, this function loads the inputs of the next block.
     """
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):

@@ -43,7 +43,8 @@ _AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelA
 
 #: Number of words (of eight bytes) in the header of a Python object.
 _OWN = object.__basicsize__ // 8
-#: Index of the 8-byte word with an object's type, and index of the word with a tuple's first item.
+#: Positions of 8-byte words in memory: the word with the type of an object, and the word with the first item
+#: of a tuple.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words in a NumPy array (the C structure PyArrayObject_fields). The number of axes and the
 #: flags are numbers of four bytes.
@@ -51,7 +52,8 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN +
 #: In the C structure PyArray_Descr (an element type), one word has the byte order and the type number.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
-#: Required flags of an input array (C-contiguous and aligned), and of an output array (also writable).
+#: NumPy's flags for the arrays: an input array is C-contiguous and aligned. An output array must also be
+#: writable.
 _READABLE, _WRITABLE = 0x101, 0x501
 
 _incref = types.ExternalFunction("Py_IncRef", types.void(types.int64))
@@ -236,7 +238,8 @@ def single(
     Returns:
         The function and its kernel arguments. The arguments of the function are q, then v and a if the
         quantity needs them, and then the output array or None. The function returns the result, or None if it
-        does not support the arguments. The kernel arguments also contain the number of results so far.
+        does not support the arguments. The array of kernel arguments also contains a counter of the results
+        that the function has computed.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
