@@ -260,8 +260,7 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 
 def turned(joint: Joint) -> FloatArray:
-    """Return the pose (4, 4) of a frame whose z axis is the joint's axis, relative to the joint's URDF
-    frame."""
+    """Return the pose (4, 4) of a frame whose z axis is the joint's axis, in the joint's URDF frame."""
     A = np.eye(4)
     if joint.kind.has_axis:
         A[:3, :3] = axis_aligning(joint.axis)

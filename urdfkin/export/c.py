@@ -1,10 +1,10 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
 The exported code allocates no memory and has no global variables. Each function is straight-line code. In the
-arrays of a function, successive numbers of one configuration are `L` elements apart. For one configuration,
-L is 1. For a batch, L is the number of configurations that are computed together. A compiler then turns each
-line of code into one vector instruction. The parts of a file that do not depend on the robot are templates in
-`frames/`.
+arrays of a function, successive numbers of one configuration are `L` elements apart. For one configuration, L
+is 1. For a batch, L is the number of configurations that one call computes at the same time. A compiler then
+turns each line of code into one vector instruction. The parts of a file that do not depend on the robot are
+templates in `frames/`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 def framed(name: str, /, **parts: str | int) -> str:
     """Return a template in which each `@name@` is replaced by the text `parts[name]`.
 
-    A `@name@` inside an inserted text is not replaced.
+    If an inserted text contains such a `@name@`, the name is not replaced.
     """
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
@@ -83,7 +83,7 @@ def _head(code: Code) -> list[str]:
 
 
 def what(function: Function) -> str:
-    """Return a text with the shape and the equation numbers of a function's result."""
+    """Return the shape of a function's result and the numbers of its equations, as in "4 x 4, eq. 7.77"."""
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 

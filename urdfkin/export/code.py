@@ -21,7 +21,8 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
-#: Precedence levels: a sum, a change of sign, a product, and an operand that needs no brackets.
+#: Precedence of operators, lowest first: a sum, a change of sign, a product, and an operand that needs no
+#: brackets.
 _SUM, _SIGN, _PRODUCT, _ATOM = range(4)
 _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
@@ -206,10 +207,10 @@ def _rows(names: Collection[str]) -> list[Quantity]:
 
 
 class Writer:
-    """Writer of a function's expressions as text, for any language with infix operators.
+    """Writes a function's expressions in a language in which a sum is written as a + b.
 
     Args:
-        code: The exported code, which contains the names.
+        code: The exported code, which contains the names of inputs and joints.
         function: A function of this code.
         literal: Function that writes a constant.
         sine: Whether to write sine and cosine as operations; if not, they are inputs.
@@ -239,7 +240,7 @@ class Writer:
         return [node for node in self.function.nodes if node.op in leaves and node in self.inside]
 
     def statements(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-        """Yield the comment and the statements (name, value) for each step of the path."""
+        """For each joint of the path, yield a comment and a list of assignments (name, value)."""
         nodes = [x for x in self.function.statements if x in self.inside and x.op not in self.leaves]
         for place, group in groupby(nodes, key=lambda node: node.place):
             found = list(group)
@@ -261,7 +262,7 @@ class Writer:
         return [self.text(x) for x in self.function.results]
 
     def text(self, x: Number, level: int = _SUM) -> str:
-        """Return an expression as an operand, in brackets if its precedence is below `level`."""
+        """Return an expression as text, in brackets if the precedence of its operator is below `level`."""
         if not isinstance(x, Node):
             return self.literal(float(x) if isinstance(x, int) else x)
         if x in self.own or x.op in self.code.words:
@@ -269,7 +270,7 @@ class Writer:
         return self.defined(x, level)
 
     def defined(self, x: Node, level: int = _SUM) -> str:
-        """Return the right-hand side of a statement."""
+        """Return the text of an expression, as on the right-hand side of an assignment."""
         if x.op in ("sin", "cos", "sqrt"):
             return f"{x.op}({self.text(x.of[0])})"
         if x.op == "neg":
@@ -277,7 +278,7 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # The brackets of a + (b + c) are kept, so that the code rounds as in the check with Pinocchio.
+            # The brackets of a + (b + c) remain, because the check with Pinocchio adds in this order, too.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 

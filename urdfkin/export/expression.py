@@ -1,12 +1,12 @@
 """Define symbolic numbers.
 
-Arithmetic with these numbers builds a graph of expressions, from which code is written.
+Arithmetic with these numbers creates a graph of expressions. urdfkin writes code from this graph.
 
 The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
-The graph simplifies each expression when it is created. Constants are Python floats, and operations on
-constants are computed at once. Products with 0 and 1 and sums with 0 are removed. A product (-x) y becomes
--(x y), and a sum x + (-y) becomes the difference x - y. Equal expressions are the same node, so the sine and
-the cosine of each joint occur once.
+The graph simplifies each expression when it is created. Constants are Python floats, so an operation on
+constants is computed and not stored in the graph. Products with 0 and 1 and sums with 0 are removed. A
+product (-x) y becomes -(x y), and a sum x + (-y) becomes the difference x - y. Equal expressions are the same
+node, so the sine and the cosine of each joint occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.input("q", 0), graph.input("q", 1)
@@ -34,7 +34,7 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        of: The operands, which are nodes and constants. For an input, `of` is its index in q, v or a.
+        of: The operands, which are nodes and constants. For an input such as q[3], `of` contains the index 3.
         index: Number of the expression in the order of creation. An expression is created after its operands,
             so its number is larger than theirs.
         place: Number of the joint on the path at which the recursion created this expression.
@@ -78,7 +78,7 @@ class Node:
 
     @property
     def operands(self) -> list[Node]:
-        """The operands that are expressions, without the constants."""
+        """The operands that are not constants."""
         return [x for x in self.of if isinstance(x, Node)]
 
 
@@ -105,7 +105,7 @@ class Graph:
         return self.made(letter, place)
 
     def made(self, op: str, *of: Any) -> Node:
-        """Return the node of an operation. Equal operations with equal operands have the same node."""
+        """Return the node of an operation. Two equal operations with the same operands have the same node."""
         key = (op, *of)
         if (node := self._made.get(key)) is None:
             node = self._made[key] = Node(self, op, of, len(self._made))

@@ -1,10 +1,11 @@
 """Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
-The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's.
-When a user runs the file, its test vectors check the file and also the user's compiler, language version and
-libraries. The test vectors contain true values at fifty digits, computed from the URDF's
-decimals. For each number they also contain the error bound of a correct computation, in eps of the precision
-used. The inputs are single-precision numbers, so they are equal in single and in double precision.
+The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's. When
+a user runs the file, its test vectors check the file and also the user's compiler, language version and
+libraries. The test vectors contain true values at fifty digits, computed from the URDF's decimals. For each
+true value they also contain a bound on the rounding errors of a correct computation. The unit of the bound is
+the eps of the file's precision. The inputs are single-precision numbers, so they are equal in single and in
+double precision.
 """
 
 from __future__ import annotations

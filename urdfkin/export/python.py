@@ -1,7 +1,7 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. The code for JAX and PyTorch is the code for any array API
-namespace, with the function names of JAX or PyTorch.
+The expressions are the same for all libraries. The code for JAX and PyTorch resembles the code for any array
+API namespace, but it calls the functions of JAX or PyTorch.
 """
 
 from __future__ import annotations
@@ -112,7 +112,10 @@ def _shapes(writer: Writer) -> list[str]:
 
 
 def _zero(writer: Writer, xp: str) -> str:
-    """Return the line of code that defines zeros of the batch shape, with the inputs' type and device."""
+    """Return the line of code that creates an array of zeros.
+
+    The array has the batch shape, the type and the device of the inputs.
+    """
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)

@@ -1,10 +1,10 @@
 """Bound the rounding errors of an exported function in single precision, for each number of its result.
 
 The code in a file is a list of operations. Each operation and each constant has a rounding error. To first
-order in eps, the error of a result is a sum over the operations and constants. Each term is the rounding
-error, multiplied by the derivative of the result with respect to that operation or constant. The bound is the
-sum of the absolute values of the terms. One backward pass over the operations computes the derivatives of all
-results.
+order in eps, the error of a result is a sum over the operations and constants. The error of the result caused
+by one operation is the operation's rounding error times the derivative of the result with respect to the
+operation. The same is true for a constant. The bound is the sum of the absolute values of these products. One
+backward pass over the operations computes the derivatives of all results.
 
 `urdfkin.kinematics.roundings` derives the error of one operation.
 """
@@ -26,7 +26,7 @@ from urdfkin.kinematics.roundings import (
 )
 from urdfkin.model.tree import FloatArray
 
-#: Number of results whose derivatives are computed in one backward pass; it limits the memory.
+#: Number of results whose derivatives are computed in one backward pass. A larger number needs more memory.
 _TOGETHER = 512
 #: For each operation, the derivatives of its value with respect to its operands.
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
@@ -46,7 +46,7 @@ def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArra
     """Return the bounds (n, results) on the errors in single precision, in eps = 2^-23.
 
     The bounds do not include the rounding errors of the code's constants in double precision. A bound is inf
-    if a number of the code is beyond the range of single precision.
+    if a number that the code computes is beyond the range of single precision.
 
     Args:
         function: The function.

@@ -485,8 +485,8 @@ class Robot(Displayable):
     def sample(self, n: int, seed: int = 0) -> FloatArray:
         """Draw random configurations (n, nq) within the limits, those of mimic joints included.
 
-        The same seed gives the same configurations. It is possible that no value of a mimicked joint
-        satisfies both its own limits and those of the mimic joint. Then only its own limits apply, and
+        The same seed gives the same configurations. In some robots, no value of a mimicked joint satisfies
+        the joint's own limits and those of its mimic joint. For such a joint only its own limits apply, and
         `limit_violations` names the mimic joint.
 
         Args:
@@ -734,11 +734,11 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return a quantity by its name; the result equals that of the method of the same name.
+        """Compute the quantity with the given name; the method with this name returns the same result.
 
         Args:
             name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
-            inputs: The inputs of the method of that name, in order: (q,), (q, v) or (q, v, a).
+            inputs: A tuple: (q,), (q, v) or (q, v, a), depending on the quantity.
 
         Raises:
             UnknownNameError: the quantity or the frame does not exist.
@@ -896,9 +896,10 @@ class Robot(Displayable):
         """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion.
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
-        In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes or the point move.
-        The linear part of the spatial acceleration is the linear part of the classical acceleration minus w x
-        vel. If the base moves, you must add the acceleration that the base causes.
+        In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. The reason is that the axes (LOCAL)
+        or the body point (WORLD) change with time. The linear part of the spatial acceleration is the linear
+        part of the classical acceleration minus w x vel. If the base moves, you must add the acceleration
+        that the base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -1215,11 +1216,11 @@ class Robot(Displayable):
     ) -> Enclosures:
         """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
-        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130, without rounding. Their inputs are the
-        decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Each end of an interval is a
-        double, and the two ends are nearly always neighbouring doubles. The result also states whether
-        urdfkin's and Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each
-        joint before the frame.
+        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130, without rounding. The true values are
+        computed from the decimals in the URDF and from the exact doubles of `q`, `v`, `a` and `base`. Each
+        end of an interval is a double, and the two ends are nearly always neighbouring doubles. The result
+        also states whether urdfkin's and Pinocchio's values lie in the intervals. The computation takes less
+        than 1 ms for each joint before the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1420,7 +1421,7 @@ class Robot(Displayable):
         )
 
     def select(self, path: FrameChain | DHTable, q: Given) -> FloatArray:
-        """Return the coordinates of a chain or table, (..., coordinates), from the robot's `q` (..., nq).
+        """Return the n coordinates (..., n) of a chain or table, selected from the robot's `q` (..., nq).
 
         Args:
             path: A result of `chain` or `dh`.
@@ -1667,8 +1668,8 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: Patterns for list items: of a list in the docstring of `Robot`, and of the section `Args` or `Raises` of a
-#: method.
+#: Regular expressions for items of a list: in the docstring of `Robot`, and in the section `Args` or `Raises`
+#: of a method.
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
@@ -1676,7 +1677,7 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
     """Return the docstring of a method of `Robot`, completed with the shared arguments and errors.
 
-    The shape of the result, its units and its equations come from the table of quantities.
+    The dictionary `QUANTITIES` contains the shape, the units and the equations of the result.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)

@@ -266,7 +266,7 @@ def _load_usd(
 
 
 def _is_plain(robot: Robot) -> bool:
-    """Return whether no root joint was added, no joint was locked, and every mimic joint kept its rule."""
+    """Return whether the robot has no added root joint, no locked joint and all of its mimic rules."""
     origin = robot.origin
     return origin.mimic is not False and origin.root_joint is None and not origin.lock
 

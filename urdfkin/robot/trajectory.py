@@ -3,15 +3,15 @@
 A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. The motion starts and ends at
 rest, and the acceleration is continuous. If a file has no joint velocities, they are computed by central
 differences of the configurations, after the angles are unwrapped. The error of these joint velocities is
-proportional to the square of the time step. Joint accelerations that are computed from configurations have a
-larger error at the start and the end of the trajectory: this error is proportional to the time step. To
-estimate the errors, the differences are also computed from every second sample, and the two results are
+proportional to the square of the time step. If joint accelerations are computed from configurations, their
+errors at the start and the end of the trajectory are larger. These errors are proportional to the time step.
+To estimate the errors, the differences are also computed from every second sample, and the two results are
 compared.
 
-A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. The jump from one end of this range to the
-other is not a motion. A difference across this jump would, however, give a huge joint velocity. The angle of
-a planar joint wraps in the same way. The quaternion of a floating joint may change its sign without a change
-of orientation.
+A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. If the wheel passes the end of this range,
+the angle in the log jumps. A velocity that is computed from this jump would be huge and wrong. The angle of a
+planar joint wraps in the same way. The quaternion of a floating joint may change its sign without a change of
+orientation.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ _TIME_ROUNDING = 1e-6
 class Samples:
     """The n samples in a file, converted to urdfkin's convention.
 
-    An attribute is None if the file does not contain its numbers.
+    For example, the attribute `v` is None if the file contains no joint velocities.
 
     Attributes:
         where: Name of the file.
@@ -668,11 +668,11 @@ def _check_columns(
         )
 
 
-#: If the angles of a column were wrapped to one turn, they differ by at most this value (rad). It includes a
-#: margin for angles that are rounded to two decimals.
+#: If angles were wrapped to one turn, the largest and the smallest angle differ by at most this value (rad).
+#: It includes a margin for angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: If the angle (rad) between two samples exceeds this value, the direction of the rotation is ambiguous. The
-#: rotation in the other direction is then less than twice as large.
+#: If a joint turns by more than this angle (rad) between two samples, the direction of its rotation is
+#: uncertain. In the opposite direction, the joint would turn by less than twice this angle.
 _AMBIGUOUS = math.tau / 3.0
 
 #: A smaller motion (radians or metres) of a mimic joint counts as rounding.
@@ -686,7 +686,7 @@ class Unwrapped:
 
     Attributes:
         q: (n, nq) configurations.
-        joints: Names of the joints with changed coordinates.
+        joints: Names of the joints whose coordinates were changed by unwrapping.
         notes: Remarks for the user, one line each.
     """
 

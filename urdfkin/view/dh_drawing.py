@@ -111,7 +111,8 @@ class _Canvas:
     def write_labels(self) -> None:
         """Draw the labels.
 
-        Labels of the same colour at the same place are merged; other overlapping labels are moved apart.
+        Two labels of the same colour at the same point become one label. Other labels are moved so that they
+        do not overlap.
         """
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for place, along, text, color in self.labels:

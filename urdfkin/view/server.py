@@ -12,11 +12,11 @@ Four independent measures keep them out:
 
 `RequestFilter` decides about requests; it does not depend on viser or a network.
 
-Viser checks neither the Host header nor the Origin header, and has no option to check them. Viser starts its
-web server by a call of `websockets.asyncio.server.serve`. This module replaces that function and answers the
-requests itself. Before a robot is shown, the module tests the running server with requests that it must
-refuse. It stops the server if the server accepts one of these requests. A new version of viser can therefore
-make the viewer fail, but it cannot make it insecure.
+Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
+server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that answers
+the requests. Before a robot is shown, the module tests the running server with requests that it must refuse.
+It stops the server if the server accepts one of these requests. A new version of viser can therefore make the
+viewer fail, but it cannot make it insecure.
 
 The address is not passed to the browser on its command line, which every user of the machine can read.
 Instead the browser opens a file in a private folder. This file redirects the browser to the address.
@@ -306,7 +306,10 @@ def _page() -> Callable[[str], bytes]:
 
 @contextlib.contextmanager
 def _responding_with(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """Inside this context, let new servers respond with `answer`, without a log of refused requests."""
+    """While the context is open, new servers call `answer` for each request.
+
+    They do not log refused requests.
+    """
     from websockets.asyncio import server as module  # noqa: PLC0415  with viser
 
     plain: Any = module.serve

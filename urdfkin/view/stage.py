@@ -134,8 +134,8 @@ def scalar_first(R: FloatArray) -> FloatArray:
 
 #: Maximum time (s) between the opening of a page and its final layout.
 _OPENING = 15.0
-#: Direction from the robot to the camera, fraction of the view that the robot fills, and viser's vertical
-#: field of view in rad.
+#: `_FROM` is the direction from the robot to the camera. The robot fills the fraction `_FILLED` of the view.
+#: `_FOV` is viser's vertical field of view in rad.
 _FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
 
 

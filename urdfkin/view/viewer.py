@@ -1,7 +1,7 @@
 """The viewer: a panel with sliders and checked numbers beside the robot's picture.
 
-When the user moves a slider, it reports only its own number. When the program sets a value, the slider shows
-the value and reports nothing.
+When the user moves a slider, it reports only its own number. If the program sets a value, the slider shows
+this value but reports no change.
 """
 
 from __future__ import annotations
@@ -80,7 +80,8 @@ class Sliders:
         folder: The folder of the sliders.
         rows: The numbers to show.
         rate: Text after the unit: "" for q, "/s" for v, "/s²" for a.
-        moved: Called with the index and the number when the user moves a slider.
+        moved: Function that is called when the user moves a slider; its arguments are the index and the new
+            number.
     """
 
     def __init__(

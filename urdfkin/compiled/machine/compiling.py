@@ -196,8 +196,7 @@ def _skip_blas_check() -> None:
 
 
 def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return Numba's decorator that compiles a function; it has this package's options and the given
-    options."""
+    """Return Numba's decorator for compiled functions; `options` are added to this package's options."""
 
     def decorate(function: Callable[..., Any]) -> Any:
         with compiling_allowed():
