@@ -1,9 +1,9 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs are flat batches, (n, nq) and (n, nv), which `urdfkin.robot` has checked and reshaped. An input row
-that was broadcast to n rows is not copied. A few configurations are computed with Python numbers, and more
-configurations by a compiled kernel (`preload`). The kernel returns exactly the same doubles as the Python
-numbers.
+Inputs have the shapes (n, nq) and (n, nv); `urdfkin.robot` has checked and reshaped them. If all n
+configurations have the same input, this input is not copied n times. A few configurations are computed with
+Python numbers, and more configurations by a compiled kernel (`preload`). The kernel returns exactly the same
+doubles as the Python numbers.
 
 A large batch is computed with several threads. Each configuration is computed independently of the others, so
 the results are exactly the same for any number of threads.
@@ -61,7 +61,7 @@ class How(TypedDict, total=False):
         base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
         out: C-contiguous float64 array of the result's size, for the result.
         threads: Largest number of threads; None uses all processors for large batches.
-        read: Whether the caller reads the results immediately. True leaves the results in the processor's
+        read: Whether the caller reads the results immediately. If True, the results stay in the processor's
             caches.
     """
 

@@ -53,7 +53,7 @@ class Motion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`: a rotation R, an offset, and the joint's mimic rule.
+    """Numbers that describe a joint in `CompiledTree.geometry`: rotation R, offset and mimic rule.
 
     The offset leads from the previous moving joint to this joint; its components are in the previous joint's
     axes.
@@ -111,7 +111,8 @@ class CompiledTree:
             to the frame of its last moving joint.
         columns: (columns, 4) integers for each Jacobian column, see `Column`. A planar joint has three
             columns, and a floating joint has six.
-        multipliers: (columns,) the mimic multiplier of each column.
+        multipliers: (columns,) the mimic multiplier of each column's joint; 1 for a joint that mimics no
+            other joint.
         leaders: (frames, columns) index of the column to which a column is added. The columns of a joint and
             of its mimic joints are added, because these joints have the same joint velocity. Their sum is
             stored in the first of these columns on the path to the frame. The index is -1 if the column's
@@ -119,7 +120,7 @@ class CompiledTree:
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) for each moving joint: the index of the previous moving joint on the path from the
             base. The index is -1 for the first moving joint on a path.
-        lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including the offsets of
+        lengths: (steps + frames,) sums of the lengths of URDF offsets in metres, including the offsets of
             fixed joints. The first sums are from the previous moving joint to each moving joint. The other
             sums are from the last moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
@@ -158,13 +159,16 @@ class CompiledTree:
 
     @cached_property
     def is_large(self) -> bool:
-        """Whether results for ordinary coordinates and velocities may overflow because of large lengths."""
+        """Whether lengths are so large that results may overflow for ordinary coordinates and velocities."""
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
     @cached_property
     def turns_only(self) -> bool:
-        """Whether every moving joint is revolute. The sum of the link lengths to a frame is then constant."""
+        """Whether every moving joint is revolute.
+
+        For such a robot, the sum of the link lengths from the base to a frame is constant.
+        """
         return bool((self.steps[:, Step.KIND] == Motion.TURN).all())
 
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
@@ -172,7 +176,7 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Return the compiled tree with the frames of the given links.
+    """Return the compiled tree of the joints that move the given links.
 
     Args:
         tree: The robot.
@@ -360,7 +364,7 @@ class Head(IntEnum):
     Q = 9  # first scratch row of the coordinates
     V = 10  # first scratch row of the velocities
     A = 11  # first scratch row of the accelerations
-    BASE = 12  # first scratch row of the state of the base
+    BASE = 12  # first scratch row of the base's pose, velocity and acceleration
 
 
 #: Number of doubles in a row of scratch memory: one double for each of eight configurations. A row fills one
@@ -469,7 +473,7 @@ class _Writer:
         return Program(np.array(words, dtype=np.int64), np.array(self.constants), rows)
 
     def _write(self) -> None:
-        """Write the instructions for all steps and frames, in the order of the recursion."""
+        """Write the instructions for all joints and frames, from the base outwards."""
         events = list(self._events())
         last = {origin: k for k, (origin, _, _) in enumerate(events)}
         now, c = -1, 0
@@ -596,7 +600,7 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """Return the scratch memory row of each element of the frame's (6, nv) matrix, row by row.
+        """Return the index of the scratch memory row of each element of the frame's (6, nv) matrix.
 
         The argument `row` is the scratch memory row of the first column.
         """

@@ -4,8 +4,8 @@ A single configuration needs no kernel: Python computes exactly the same result 
 Numba and reading a kernel from disk takes longer, and compiling takes seconds. Therefore, this module
 measures how long Python has computed without each kernel. When this time exceeds `LOADING`, the kernel is
 read from disk. If the kernel is not on disk and the time exceeds `BESIDE`, a second process compiles the
-kernel. Python computes until the second process has finished. If the time would exceed `COMPILING`, this
-process compiles the kernel.
+kernel. Until the second process has finished, Python computes. If computing with Python would take longer
+than `COMPILING`, this process compiles the kernel.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 
     Args:
         name: Name of the kernel.
-        more: Seconds that the next computations will take without the kernel.
+        more: Estimated time (seconds) of the next computations if they do not use the kernel.
         home: Module of the kernel.
     """
     if _only and _only[-1] == "interpreted":

@@ -115,7 +115,7 @@ class Number:
 
 
 class Product:
-    """A product that is still stored as its two factors."""
+    """A product x y that is not computed yet; the attributes are its two factors."""
 
     __slots__ = ("x", "y")
 
@@ -299,7 +299,7 @@ def ordinary(total: Number) -> bool:
 
 
 def all_written(*_: object) -> None:
-    """Do nothing: interpreted code writes through the caches, so it need not wait for memory."""
+    """Do nothing. Compiled code waits here until all results are in memory; Python need not wait."""
 
 
 stream = all_written

@@ -147,7 +147,7 @@ def advance(code: Code, function: Function) -> str:
 
 
 class Layout:
-    """Layout of a function's inputs, angles, sines and cosines in the array `in`.
+    """The order in which the array `in` contains a function's inputs, angles, sines and cosines.
 
     All angles are adjacent: first the angles that are inputs, then the angles that are computed.
     """

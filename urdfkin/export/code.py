@@ -213,7 +213,8 @@ class Writer:
         code: The exported code, which contains the names of inputs and joints.
         function: A function of this code.
         literal: Function that writes a constant.
-        sine: Whether to write sine and cosine as operations; if not, they are inputs.
+        sine: Whether the written code computes sines and cosines. If False, they are inputs of the written
+            code.
     """
 
     def __init__(

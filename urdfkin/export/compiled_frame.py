@@ -188,7 +188,7 @@ def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
 
 
 class _Robot(Protocol):
-    """The parts of `Robot` that a compiled frame uses."""
+    """The attributes of `Robot` that the class `CompiledFrame` uses."""
 
     verifier: Verifier
 
@@ -203,11 +203,11 @@ class _Robot(Protocol):
 class CompiledFrame:
     """One frame of a robot in one reference frame, compiled; the result of `Robot.compiled`.
 
-    Results agree with the results of `Robot` within the error bound, but not to the last bit. The result of a
-    configuration has the same bits in a batch and in a single call. Inputs are checked: a wrong shape or a
-    number that is not finite is an error. The machine code is compared with Pinocchio once, on a hundred
+    Results agree with the results of `Robot` within the error bound, but not to the last bit. A configuration
+    has exactly the same result in a batch and in a single call. Inputs are checked: a wrong shape or a number
+    that is not finite is an error. The machine code is compared with Pinocchio once, on a hundred
     configurations, unless the robot is loaded with `verify=False`. The results of later calls are not
-    compared, and the certificate counts them as unchecked.
+    compared, and `Robot.certificate` reports them as unchecked.
 
     Attributes:
         frame: The frame's name.

@@ -208,9 +208,10 @@ def _single(x: FloatArray) -> FloatArray:
 
 
 def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatArray, FloatArray]:
-    """Return two arrays (n, numbers) for a function's results: the error bounds and the scales.
+    """Return the error bounds of a function's results, and the scales of these bounds, as arrays.
 
-    An error bound is k * scale, in eps.
+    The first array (n, numbers) contains k * scale, because an error bound is k * scale * eps. The second
+    array (n, numbers) contains the scales.
     """
     v, a = (*part.rates, None, None)[:2]
     size = against_true_values(part.plan, part.q, v, a, errors)

@@ -107,12 +107,12 @@ def _own(node: Node, x: FloatArray) -> FloatArray:
 
 
 def _constant(x: float) -> float:
-    """Return the error of a constant, in eps: its rounding to single precision."""
+    """Return the error, in eps, of a constant that is rounded to single precision."""
     size = np.abs(x)
     return float(_in_range(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
 
 
 def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Add the errors of numbers that underflow; set the errors of numbers that overflow to inf."""
+    """Add an error for each number that underflows, and return inf for each number that overflows."""
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

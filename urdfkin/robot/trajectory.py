@@ -138,7 +138,7 @@ class Samples:
         q: (n, nq) configurations, as they are in the file.
         t: (n,) seconds, increasing.
         v: (n, nv) joint velocities.
-        a: (n, nv) joint accelerations. They are present only together with v.
+        a: (n, nv) joint accelerations. The array is None if `v` is None.
         base: Motion of the root link for all n samples.
     """
 
@@ -340,8 +340,8 @@ def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
     if n >= 2 * _FEWEST - 1:
         half = slice(None, None, 2)
         coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # With half of the samples, the time step doubles.
-        # An error of first order then doubles, and an error of second order is four times as large.
+        # With half of the samples, the time step doubles. Then an error that is proportional to the time step
+        # doubles. An error that is proportional to the square of the time step is four times as large.
         order = 1 if x.v is None else 2
         errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"

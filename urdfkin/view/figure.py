@@ -73,7 +73,10 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def style(**more: Any) -> Any:
-    """Return a matplotlib context in which text stays text and equal drawings give equal files."""
+    """Return a matplotlib context.
+
+    In SVG files of this context, text is stored as text, and equal drawings give equal files.
+    """
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 
@@ -144,7 +147,7 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
 
 
 def _with_ids(text: str, prefix: str) -> str:
-    """Keep only ids that are referred to, and add the prefix to them."""
+    """Remove unused ids from an SVG text, and add the prefix to all other ids."""
     used = set(re.findall(r"url\(#([^)]+)\)", text)) | set(re.findall(r'href="#([^"]+)"', text))
     text = re.sub(
         r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", text

@@ -232,7 +232,7 @@ def _coordinates(
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
     """Return whether each sample is outside the limits by more than one unit in the last place of a double.
 
-    A smaller deviation may come from the decimal notation of the limits, so it does not count.
+    A smaller deviation is ignored, because it may come from the decimal notation of the limits.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))

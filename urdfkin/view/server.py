@@ -116,7 +116,7 @@ class RequestFilter:
         return None
 
     def _is_known(self, host: str) -> bool:
-        """Return whether a Host header may name this server.
+        """Return whether the Host header of a request names this machine: an IP address or an allowed name.
 
         An attacker can make a host name resolve to this machine. An IP address needs no name server, so it is
         safe. The port in the header is not checked, because it differs if the port is forwarded.

@@ -158,7 +158,7 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
 
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
-#: Display modes of the shapes, and the kinds of names that can be shown beside the frames.
+#: `SHAPES` are the display modes of the shapes. `NAMES` are the names that can be shown beside frames.
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
@@ -217,7 +217,10 @@ class Stage:
         initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes. Return whether shapes are missing; then the skeleton is shown."""
+        """Add the shapes.
+
+        Return True if any shape is missing, or if there are none; the viewer then shows the skeleton.
+        """
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)

@@ -386,10 +386,10 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @compiled
 def stream(x, count, to, at, address):
-    """Copy `count` numbers to the array `to`, from `to[at]` on, without writing them to the caches.
+    """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
-    Before it writes a part of a cache line, a processor reads this line. A processor does not read a cache
-    line that is written as a whole. `address` is the address of `to[0]`.
+    Before it writes a part of a cache line, a processor reads this line. If all bytes of a cache line are
+    written at once, the processor does not read the line first. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

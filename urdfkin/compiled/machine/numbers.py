@@ -45,7 +45,7 @@ class Lanes(types.Type):
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return this type if `other` is a `Product` of the same width, else None."""
+        """Return this type if the type `other` is a `Product` with the same number of doubles, else None."""
         return self if isinstance(other, Product) and other.width == self.width else None
 
 
@@ -316,7 +316,7 @@ zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
 
 @intrinsic
 def rounded(context: Any, x: Any) -> Any:
-    """Multiply the factors of a product and round the result, so that no later sum is fused with it.
+    """Multiply the factors of a product and round the result. A later sum is then rounded separately.
 
     Return other numbers unchanged.
     """

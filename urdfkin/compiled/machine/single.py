@@ -7,8 +7,8 @@ reads only a few 8-byte words of each array object, at the offsets that CPython 
 The function holds Python's global interpreter lock for about a microsecond. For arguments that it does not
 support, the function returns None.
 
-A call marks its scratch memory as busy in one atomic operation, which is also safe in a Python without a
-global interpreter lock. If another thread is using the scratch memory, the function also returns None. The
+A call marks its scratch memory as busy. This is one atomic operation, so it is also safe in a Python without
+a global interpreter lock. If another thread is using the scratch memory, the function also returns None. The
 caller then computes the result in another way.
 """
 
@@ -198,7 +198,7 @@ def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArr
 
 @cache
 def arrays_are_known() -> bool:
-    """Return whether this NumPy stores arrays in memory as this module expects.
+    """Return whether the installed NumPy has the memory layout of arrays that this module uses.
 
     If the result is False, the fast function `single` must not be used.
     """
