@@ -40,7 +40,7 @@ class Function:
     Attributes:
         quantity: The quantity that the function computes, for example the placement.
         reference: The reference frame.
-        plan: The compiled tree of the path.
+        plan: The compiled tree of the joints from the base to the frame.
         results: The numbers of the result, row by row. Each number is a constant or an expression.
     """
 
@@ -158,7 +158,7 @@ def function_of(
     """Return the function that computes a quantity for the only frame of a compiled tree.
 
     Args:
-        plan: The compiled tree of the path.
+        plan: The compiled tree of the joints from the base to the frame.
         quantity: A quantity that can be exported.
         reference: The reference frame.
         graph: The graph in which the tree's exact constants were created. None: the constants are doubles.
