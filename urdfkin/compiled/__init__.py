@@ -1,4 +1,4 @@
-"""The textbook's recursion (sections 7.4 and 7.7), written once.
+"""The textbook's forward recursion (sections 7.4 and 7.7).
 
-Either Python interprets this recursion, or Numba compiles it.
+Python interprets the code of this recursion, or Numba compiles the same code.
 """

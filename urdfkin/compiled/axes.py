@@ -20,12 +20,12 @@ from urdfkin.kinematics import equations as eq
 
 
 def link_axes(own, world):
-    """Return `own`, the vector in the link's own axes."""
+    """Return the first argument, the vector in the link's own axes."""
     return own
 
 
 def world_axes(own, world):
-    """Return `world`, the vector in world axes."""
+    """Return the second argument, the vector in world axes."""
     return world
 
 
@@ -38,9 +38,9 @@ def seen(axes, R, x):
 
 
 def seen_after(axes, S, x):
-    """Return the components of a velocity or acceleration x for a link frame that is rotated by S.
+    """Return a velocity or acceleration x of a link after the link's frame is rotated by S.
 
-    Components in world axes do not change. Components in the link's own axes are converted to the rotated
-    axes.
+    If the recursion uses world axes, the components of x do not change. If the recursion uses the link's own
+    axes, the components are converted to the rotated axes.
     """
     return axes(eq.rotate(eq.transposed(S), x), x)

@@ -19,9 +19,9 @@ digits if the robot is far from the world's origin or has a long link.
 
 The angular acceleration follows from equation 7.129. Its term a_k z is added to the transverse acceleration.
 Its term v_k w_{k-1} x z is added to the Coriolis acceleration. A planar or floating joint translates and
-rotates at the same time, and its axes of translation rotate with it. Its linear velocity is s, and its
-angular velocity is o. The acceleration of such a joint has one more term, o x s, which is added to the
-Coriolis acceleration.
+rotates at the same time, and its axes of translation rotate with it. The joint's linear velocity is s, and
+its angular velocity is o. The acceleration of a planar or floating joint has one more term, the cross product
+o x s. This term is added to the Coriolis acceleration.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs are flat batches, (n, nq) and (n, nv), which `urdfkin.robot` has checked and reshaped. An input row
-that was broadcast to n rows is not copied. A few configurations are computed with Python numbers, and more
-configurations by a compiled kernel (`preload`). The kernel returns exactly the same doubles as the Python
-numbers.
+Inputs have the shapes (n, nq) and (n, nv); `urdfkin.robot` has checked and reshaped them. If all n
+configurations have the same input, this input is not copied n times. A few configurations are computed with
+Python numbers, and more configurations by a compiled kernel (`preload`). The kernel returns exactly the same
+doubles as the Python numbers.
 
 A large batch is computed with several threads. Each configuration is computed independently of the others, so
 the results are exactly the same for any number of threads.
@@ -44,9 +44,11 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Results of at least this size (bytes) are written directly to memory, because the caches are too small.
+#: If the results have at least this number of bytes, they are written to memory and not to the caches, which
+#: are too small.
 _STREAMED = 2 << 20
-#: Number of values in a block of results. A block fits into half of the processor's first-level cache.
+#: Largest number of doubles in the buffer of results. A full buffer fills half of the processor's first-level
+#: cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -59,7 +61,7 @@ class How(TypedDict, total=False):
         base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
         out: C-contiguous float64 array of the result's size, for the result.
         threads: Largest number of threads; None uses all processors for large batches.
-        read: Whether the caller reads the results immediately. True leaves the results in the processor's
+        read: Whether the caller reads the results immediately. If True, the results stay in the processor's
             caches.
     """
 
@@ -183,8 +185,8 @@ def _interpreted(
 ) -> int | None:
     """Compute a batch with Python numbers; return None, without a result, if a kernel is faster.
 
-    Otherwise return 1 if an input is nan, infinite or too large, else 0. The function measures the processor
-    time of each configuration, and estimates from it whether a kernel is faster.
+    After a computation, return 1 if an input is nan, infinite or too large, and 0 otherwise. The function
+    measures the processor time of each configuration, and estimates from it whether a kernel is faster.
     """
     if preload.kernel(name) is not None:
         return None
@@ -265,10 +267,11 @@ def task_of(
     Args:
         program: The program of the recursion.
         reference: The reference frame of the results.
-        inputs: The base's state, q and, if needed, v and a. Each of them has one row, or as many rows as
-            `out`.
+        inputs: Arrays: the base's state, q and, if needed, v and a. Each array has one row for all
+            configurations, or one row for each configuration.
         out: (n, ...) array for the result.
-        staged: Whether blocks are collected before output (`is_staged`).
+        staged: Whether the kernel writes results to a buffer first, and then copies the buffer to `out` (see
+            `is_staged`).
     """
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
@@ -365,7 +368,8 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
     """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
     Args:
-        compute: Computes the rows of a slice. For an empty batch it is called once, with an empty slice.
+        compute: Computes the rows of a slice. For an empty batch, this function is called once, with an empty
+            slice.
         n: Number of rows.
         threads: Largest number of threads, as in `in_blocks`.
 

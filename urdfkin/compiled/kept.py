@@ -20,9 +20,10 @@ from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
 #: Lock for the import of Numba and for compilations. A fork of the process waits for this lock, because the
-#: child could not finish an import or a compilation. A fork acquires several locks in the reverse order of
-#: their creation. The import of Numba uses the lock of `logging`. The lock `compiling` must therefore be
-#: created after the lock of `logging`. The lock `compiling` is created before the import of Numba begins.
+#: child could not finish an import or a compilation. Before a fork, Python acquires the locks in the reverse
+#: order of their creation. The import of Numba uses the lock of the module `logging`. The lock `compiling`
+#: must therefore be created after the lock of `logging`. The lock `compiling` exists before the import of
+#: Numba begins.
 compiling = lock_over_forks()
 
 #: A function that receives the events of compilations.
@@ -62,7 +63,8 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
     """Inform the listener when the compilation of the kernel `name` begins and ends.
 
-    The context yields a function. The caller must call this function if it begins to compile the kernel.
+    The context yields a function. The caller of `compile_event` must call this function before it compiles
+    the kernel.
     """
     begun: list[float] = []
 

@@ -18,7 +18,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: Indices of rows of scratch memory: 16 for a 4 by 4 pose, and six for [linear; angular].
+#: Indices of the scratch memory rows that contain the 16 numbers of a pose, and the six numbers of a velocity
+#: or acceleration.
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -31,7 +32,7 @@ def _unused_vector():
 
 
 def follow_place(state):
-    """Return R and p of a link's state, and mark the other parts as unused.
+    """Mark all vectors of a link's state as unused, except the rotation R and the position p.
 
     A placement needs only R and p.
     """
@@ -39,17 +40,17 @@ def follow_place(state):
 
 
 def follow_velocity(state):
-    """Return R, p, w and vel of a link's state, and mark alpha and acc as unused.
+    """Mark the accelerations alpha and acc of a link's state as unused.
 
-    A velocity does not need accelerations.
+    A velocity does not depend on accelerations.
     """
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
 def follow_acceleration(state):
-    """Return a link's state, and mark the velocity `vel` as unused.
+    """Mark the linear velocity `vel` of a link's state as unused.
 
-    Equation 7.130 does not contain this velocity.
+    The acceleration (equation 7.130) does not depend on this velocity.
     """
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
@@ -238,10 +239,11 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
 def _add_changes(s, program, i, first, end, reference):
     """Add the derivatives of column i with respect to the motion of each joint.
 
-    Column i belongs to a joint on the path. An earlier joint on the path rotates the whole column. A later
-    joint moves only the reference point of the column, which is the frame's origin. For WORLD, the reference
-    point does not move, so a later joint does not change the column. For LOCAL, an earlier joint rotates the
-    column and the axes of the frame together, so it does not change the components of the column.
+    Column i belongs to a joint on the path. If an earlier joint on the path turns, the linear and angular
+    parts of column i turn with it. A later joint moves only the reference point of the column, which is the
+    frame's origin. For WORLD, the reference point does not move, so a later joint does not change the column.
+    For LOCAL, an earlier joint rotates the column together with the axes of the frame. The components of the
+    column in these axes do not change.
     """
     v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
     for j in range(first, end, PAIR_WIDTH):

@@ -1,9 +1,10 @@
 """Compile a robot's tree into arrays, and into a program: the list of instructions that a kernel executes.
 
-The arrays have a row for each moving joint, called a step, and a row for each frame. As in the textbook,
-every joint frame is rotated so that the joint's axis is z (`turned` returns this rotation). Each revolute
-joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into the constant offsets between
-moving joints. A compiled tree contains only the joints that move one of its frames.
+A moving joint is called a step. Some of the arrays have one row for each step, and others have one row for
+each frame. As in the textbook, every joint frame is rotated so that the joint's axis is z (`turned` returns
+this rotation). Each revolute joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into
+the constant offsets between moving joints. A compiled tree contains only the joints that move one of its
+frames.
 
 The program consists of the instructions for each block of configurations. The instructions are chosen once
 for each robot. There are special instructions for a translation along a coordinate axis and for a rotation
@@ -11,8 +12,8 @@ about a coordinate axis. These instructions take a third of the time of the gene
 translation by zero needs no instruction. The state of a link stays in registers until the next link is
 computed. At a branch of the tree, the state is saved to memory and read again later.
 
-`KernelArgs` names the arguments of a kernel. The arguments of a kernel are one row of integers: addresses,
-sizes and options.
+`KernelArgs` names the arguments of a kernel. All arguments of a kernel are integers: memory addresses,
+lengths and options.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class Step(IntEnum):
 
 
 class Motion(IntEnum):
-    """The kinds of a step: the values of column `Step.KIND`."""
+    """The kinds of moving joints: the values in the column `Step.KIND`."""
 
     TURN = 0
     SLIDE = 1
@@ -52,9 +53,10 @@ class Motion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`: a rotation R, an offset, and the joint's mimic rule.
+    """Numbers that describe a joint in `CompiledTree.geometry`: rotation R, offset and mimic rule.
 
-    The offset is in the axes of the previous step.
+    The offset leads from the previous moving joint to this joint; its components are in the previous joint's
+    axes.
     """
 
     R = 0
@@ -64,7 +66,7 @@ class Geometry(IntEnum):
 
 
 class Column(IntEnum):
-    """Columns of `CompiledTree.columns`; each row of that array describes a Jacobian column of eq. 7.85."""
+    """Integers that describe one Jacobian column (eq. 7.85): a row of `CompiledTree.columns`."""
 
     STEP = 0
     AXIS = 1
@@ -80,8 +82,8 @@ _MOTION = {
     JointKind.FLOATING: Motion.FLOATING,
 }
 
-#: For each joint velocity of a joint: the index of its axis in the joint's frame.
-#: The second value is True for a rotation about this axis, and False for a translation along it.
+#: The motions of a joint, for example two translations and a rotation for a planar joint. A motion is stored
+#: as the index of its axis in the joint's frame, and True for a rotation or False for a translation.
 _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
     Motion.TURN: ((2, True),),
     Motion.SLIDE: ((2, False),),
@@ -92,34 +94,38 @@ _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class CompiledTree:
-    """The moving joints of a tree (the steps of the recursion) and the frames whose results are requested.
+    """The moving joints and the frames that a computation needs, stored in arrays.
 
-    The steps are sorted from the base to the ends of the tree.
+    A joint comes after all joints between it and the base.
 
     Attributes:
         nq: Length of `q`.
         nv: Length of `v` and `a`.
-        joints: The moving joint of each step, as an index into the tree's joints.
+        joints: Indices of the moving joints in the tree's list of joints.
         steps: (steps, 3) integers, columns `Step`.
         geometry: (steps, 14), columns `Geometry`.
-        frames: (frames, 2) for each frame: the step before the frame (-1: the base), and the frame's index in
-            the output. The rows are sorted by step.
-        offsets: (frames, 12) rotation (9) and offset (3) from the frame of the step to each frame. The offset
-            is in the axes of the step.
-        columns: (columns, 4) a row for every joint velocity of every step; `Column` describes its numbers.
-        multipliers: (columns,) the mimic multiplier of each column.
-        leaders: (frames, columns) for each column: index of the first column on the path to the frame with
-            the same joint velocity. The columns of a joint and of its mimic joints have the same joint
-            velocity and are added. The index is -1 if the column's joint does not move the frame.
+        frames: (frames, 2) integers for each frame: the index of the last moving joint before the frame, and
+            the frame's index in the output. The first integer is -1 if no joint moves the frame. The array is
+            sorted by the first integer.
+        offsets: (frames, 12) rotation matrix (9 numbers) and translation (3 numbers) of each frame, relative
+            to the frame of its last moving joint.
+        columns: (columns, 4) integers for each Jacobian column, see `Column`. A planar joint has three
+            columns, and a floating joint has six.
+        multipliers: (columns,) the mimic multiplier of each column's joint; 1 for a joint that mimics no
+            other joint.
+        leaders: (frames, columns) index of the column to which a column is added. The columns of a joint and
+            of its mimic joints are added, because these joints have the same joint velocity. Their sum is
+            stored in the first of these columns on the path to the frame. The index is -1 if the column's
+            joint does not move the frame.
         places_q: Indices of the coordinates that the recursion needs.
-        parents: (steps,) for each step: index of the previous moving joint on the path from the base, or -1
-            if there is none.
-        lengths: (steps + frames,) metres: sum of the lengths of all URDF offsets, including the offsets of
-            fixed joints. The first numbers are the lengths from the parent step to each step. The other
-            numbers are the lengths from the step to each frame (in the order of `frames`).
+        parents: (steps,) for each moving joint: the index of the previous moving joint on the path from the
+            base. The index is -1 for the first moving joint on a path.
+        lengths: (steps + frames,) sums of the lengths of URDF offsets in metres, including the offsets of
+            fixed joints. The first sums are from the previous moving joint to each moving joint. The other
+            sums are from the last moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
-        tilts: (frames,) sum (rad) of `Joint.tilt` over all URDF joints between the root and each frame, in
-            output order.
+        tilts: (frames,) the sum of the angles `Joint.tilt`, in rad, of all URDF joints between the root and
+            the frame. The frames are in the order of the output.
     """
 
     nq: int
@@ -153,13 +159,16 @@ class CompiledTree:
 
     @cached_property
     def is_large(self) -> bool:
-        """Whether results for ordinary coordinates and velocities may overflow because of large lengths."""
+        """Whether lengths are so large that results may overflow for ordinary coordinates and velocities."""
         numbers = self.geometry, self.offsets, self.lengths
         return any(float(np.abs(x).max(initial=0.0)) >= LARGE for x in numbers)
 
     @cached_property
     def turns_only(self) -> bool:
-        """Whether every moving joint is revolute. The sum of the link lengths to a frame is then constant."""
+        """Whether every moving joint is revolute.
+
+        For such a robot, the sum of the link lengths from the base to a frame is constant.
+        """
         return bool((self.steps[:, Step.KIND] == Motion.TURN).all())
 
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
@@ -167,7 +176,7 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Return the compiled tree with the frames of the given links.
+    """Return the compiled tree of the joints that move the given links.
 
     Args:
         tree: The robot.
@@ -213,7 +222,9 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return the links on the paths to the given links, root first, each with the number of joints before it.
+    """Return a dictionary of the links on the paths to the given links.
+
+    The value of a link is the number of joints between the root and the link.
 
     Each joint is visited once. A separate path for each link would take time proportional to the tree's
     depth.
@@ -231,7 +242,7 @@ def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
 
 
 class _Anchor(NamedTuple):
-    """A link's last moving joint (-1: none), its pose in that joint's frame, and the path length."""
+    """The pose of a link relative to its last moving joint; `step` is -1 if no joint moves the link."""
 
     step: int
     T: FloatArray
@@ -253,7 +264,7 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 
 def turned(joint: Joint) -> FloatArray:
-    """Return the pose (4, 4), in the joint's URDF frame, of a frame whose z axis is the joint's axis."""
+    """Return the pose (4, 4) of a frame whose z axis is the joint's axis, in the joint's URDF frame."""
     A = np.eye(4)
     if joint.kind.has_axis:
         A[:3, :3] = axis_aligning(joint.axis)
@@ -293,10 +304,7 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
 
 
 def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
-    """Return the array `CompiledTree.leaders`.
-
-    The argument `ends` has, for each frame, the last step before the frame.
-    """
+    """Return the array `CompiledTree.leaders`."""
     leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
     rows = columns.tolist()
     for frame, end in enumerate(ends):
@@ -317,7 +325,8 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 class Op(IntEnum):
     """The instructions of a program.
 
-    An instruction with an axis has four forms, in this order: for the axis x, y, z, and for any axis.
+    For a translation or rotation there are four instructions: for the x axis, the y axis, the z axis, and any
+        axis.
     """
 
     END = 0
@@ -341,13 +350,13 @@ class Op(IntEnum):
 
 
 class Head(IntEnum):
-    """Positions of the numbers at the beginning of a program, before its instructions."""
+    """Indices of the integers at the beginning of a program, before the instructions."""
 
     CODE = 0  # index of the first instruction
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # start of the list of the needed blocks of eight coordinates
+    BLOCKS_Q = 4  # index of the list of blocks to read from q; a block is eight coordinates
     BLOCKS_V = 5
     BLOCKS_END = 6
     ANGLES = 7  # start of the list of joint angles
@@ -355,24 +364,27 @@ class Head(IntEnum):
     Q = 9  # first scratch row of the coordinates
     V = 10  # first scratch row of the velocities
     A = 11  # first scratch row of the accelerations
-    BASE = 12  # first scratch row of the state of the base
+    BASE = 12  # first scratch row of the base's pose, velocity and acceleration
 
 
-#: Number of configurations in a row of scratch memory.
-#: A row fills one AVX-512 register or two AVX2 registers.
+#: Number of doubles in a row of scratch memory: one double for each of eight configurations. A row fills one
+#: AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers in an instruction: the operation, three operands, and the index of its constants.
+#: Number of integers in an instruction: the code of the operation, three operands, and the index of the
+#: instruction's constants.
 WIDTH = 5
-#: Each entry of the list of angles has this number of integers. The integers are: scratch row of the angle,
-#: scratch row of its sine, index of the mimic rule, and 1 or 0. The last integer is 1 if the joint has a
-#: mimic rule.
+#: A program describes each joint angle by this number of integers: the scratch row of the angle, the scratch
+#: row of its sine, and two integers about the mimic rule. The third integer is the index of the mimic rule in
+#: the constants. The fourth integer is 1 if the joint is a mimic joint, else 0.
 ANGLE_WIDTH = 4
-#: Scratch rows for the number 0, the number 1, the result of a frame, and a joint angle. `FIRST_ROW` is the
-#: first row for other numbers.
+#: The first rows of scratch memory have fixed uses: `ZERO_ROW` contains 0, and `ONE_ROW` contains 1. The
+#: results of a frame begin at `OUT_ROW`, and `ANGLE_ROW` contains a joint angle. Other numbers begin at
+#: `FIRST_ROW`.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Each Jacobian column in a list of pairs is described by this number of integers. The integers are: scratch
-#: row of the column, step of the joint, index in v, and scratch row of the sums.
+#: For a Hessian, the program describes each Jacobian column by this number of integers. The first integer is
+#: the scratch row of the column, and the second is the index of its moving joint. The third is the index of
+#: the joint's velocity in v. The fourth is the scratch row in which derivatives of the column are summed.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -388,7 +400,8 @@ class Program:
     """The program of a kernel.
 
     Attributes:
-        words: The integers of the program: the numbers of `Head`, then lists and instructions.
+        words: The program as integers: first the integers that `Head` names, then lists, for example of joint
+            angles, and then the instructions.
         constants: The constants of the instructions.
         rows: Number of rows of scratch memory that the program needs.
     """
@@ -404,7 +417,7 @@ class Program:
 
     @cached_property
     def lists(self) -> tuple[list[int], list[Number]]:
-        """`words` and `constants` as Python lists, for the recursion without a compiler."""
+        """Python lists of `words` and `constants`, which the recursion reads if it is not compiled."""
         words: list[int] = self.words.tolist()
         return words, list(map(Number, self.constants.tolist()))
 
@@ -416,11 +429,11 @@ def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs
 
     Args:
         plan: The compiled tree.
-        turned: Whether the state is rotated to the axes of each frame. Placements and results in the frame's
-            own axes need this rotation.
+        turned: Whether the program also computes the orientation of each frame. True is necessary for
+            placements, and for results in the frame's own axes.
         columns: Whether Jacobian columns are needed.
-        pairs: Whether a separate column is stored for each joint, including mimic joints. Hessians are
-            computed from pairs of these columns.
+        pairs: Whether a separate column is stored for each joint, including mimic joints. A Hessian is
+            computed from all pairs of Jacobian columns.
     """
     key = turned, columns, pairs
     made: Program | None = plan.made.get(key)
@@ -460,7 +473,7 @@ class _Writer:
         return Program(np.array(words, dtype=np.int64), np.array(self.constants), rows)
 
     def _write(self) -> None:
-        """Write the instructions for all steps and frames, in the order of the recursion."""
+        """Write the instructions for all joints and frames, from the base outwards."""
         events = list(self._events())
         last = {origin: k for k, (origin, _, _) in enumerate(events)}
         now, c = -1, 0
@@ -478,12 +491,13 @@ class _Writer:
                     c += 1
                 self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
-                now = -2  # the current state is now the state of the frame
+                now = -2  # the registers now contain the state of the frame, not of a joint
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """Yield (previous step, step, None) for each step, and (previous step, None, frame) for each frame.
+        """Yield the moving joints and frames in the order in which the recursion visits them.
 
-        The order is that of the recursion.
+        An item is (index of the previous joint, index of the joint, None), or (index of the previous joint,
+        None, index of the frame).
         """
         f = 0
         for i in range(-1, len(self.plan.steps)):
@@ -494,10 +508,10 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Write an instruction that saves the state after a step, if the state is needed again later.
+        """If the state after a joint is needed again later, write an instruction that saves the state.
 
-        `last` has, for each step, the index of the last event that needs the state after this step. The state
-        is saved if this index is above `following`.
+        `last[i]` is the index of the last event that uses the state after joint i. The event with index
+        `following` comes next and uses the state in the registers, so only later events need the saved state.
         """
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
@@ -514,9 +528,9 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write the instructions for a translation by p and a rotation by R; return whether there are any.
+        """Write the instructions for a translation by p and a rotation by R.
 
-        A translation by zero and a rotation by the identity need no instruction.
+        Return False if no instruction is needed, that is, if p is zero and R is the identity.
         """
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
@@ -529,9 +543,9 @@ class _Writer:
         return len(self.code) > before
 
     def _rule(self, i: int) -> int:
-        """Return the index in `constants` of a mimic joint's multiplier, which its offset follows.
+        """Store a mimic joint's multiplier and offset in `constants`, and return the index of the multiplier.
 
-        For other joints, the result is 0.
+        For other joints, return 0.
         """
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
@@ -539,7 +553,7 @@ class _Writer:
     def _angles(self) -> list[int]:
         """Return the list of joint angles.
 
-        The list has an entry of `ANGLE_WIDTH` numbers for each step with a rotation.
+        Each angle of a revolute or planar joint is described by `ANGLE_WIDTH` integers.
         """
         angles = []
         for i, step in enumerate(self.plan.steps):
@@ -561,9 +575,9 @@ class _Writer:
         self._put(op, first, int(step[Step.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
 
     def _frame(self, f: int) -> bool:
-        """Write the instructions that write a frame's results.
+        """Add the instructions for the results of a frame to the program.
 
-        Return True if these instructions replace the current state by the state of the frame.
+        Return True if these instructions overwrite the joint's state in the registers with the frame's state.
         """
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
@@ -586,7 +600,7 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """Return the scratch memory row of each element of the frame's (6, nv) matrix, row by row.
+        """Return the index of the scratch memory row of each element of the frame's (6, nv) matrix.
 
         The argument `row` is the scratch memory row of the first column.
         """
@@ -598,7 +612,7 @@ class _Writer:
         return found
 
     def _pairs(self, f: int) -> list[int]:
-        """Return integers that tell the kernel where the Jacobian columns for a frame's Hessian are.
+        """Return the list of Jacobian columns from which the kernel computes a frame's Hessian.
 
         The first integer is the number of columns. `PAIR_WIDTH` integers for each column follow. The last
         integers are the scratch memory rows with the elements of the result.
@@ -617,24 +631,27 @@ def _is_rotation_about(R: FloatArray, axis: int) -> bool:
 
 
 def _blocks(places: Sequence[int]) -> list[int]:
-    """Return the first index of each block of eight indices that contains at least one of `places`."""
+    """Return the first index of each block of eight that contains one of the given indices.
+
+    For example, the indices 3 and 17 are in the blocks that begin at 0 and 16.
+    """
     return sorted({int(place) // 8 * 8 for place in places})
 
 
-#: Size of a cache line of the processor, bytes.
-#: Access to a vector that lies across two cache lines takes twice as long.
+#: Size of a cache line of the processor, bytes. If a vector is partly in one cache line and partly in the
+#: next, access to the vector takes twice as long.
 _LINE = 64
-#: The reference frames that the kernels support, each with its number in a kernel.
-#: Any other reference frame raises a KeyError.
+#: The reference frames that the kernels support, with the integers that represent them in a kernel. Any other
+#: reference frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
 
 
 class KernelArgs(IntEnum):
-    """Index of each argument in the row of integers.
+    """Indices of the integers with which a kernel is called.
 
-    Only calls with one configuration use the arguments from CORE to the last.
+    The integers from CORE on are used only for calls with one configuration.
     """
 
     @staticmethod
@@ -651,8 +668,8 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Distance in memory between the first numbers of two consecutive configurations.
-    #: The distance is 0 if all configurations use the same numbers.
+    #: Number of doubles from the first number of a configuration to the first number of the next one. This
+    #: number is 0 if all configurations use the same numbers.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()

@@ -4,8 +4,8 @@ A single configuration needs no kernel: Python computes exactly the same result 
 Numba and reading a kernel from disk takes longer, and compiling takes seconds. Therefore, this module
 measures how long Python has computed without each kernel. When this time exceeds `LOADING`, the kernel is
 read from disk. If the kernel is not on disk and the time exceeds `BESIDE`, a second process compiles the
-kernel. Python computes until the second process has finished. If the time would exceed `COMPILING`, this
-process compiles the kernel.
+kernel. Until the second process has finished, Python computes. If computing with Python would take longer
+than `COMPILING`, this process compiles the kernel.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ if TYPE_CHECKING:
 LOADING, COMPILING = 0.3, 3.0
 #: When computing without a kernel has taken this many seconds, a second process compiles the kernel.
 BESIDE = 1.0
-#: If another kernel is loaded already, this limit (s) replaces `LOADING`.
+#: Limit (s) that is used instead of `LOADING` after the first kernel is loaded.
 _LOADING_MORE = 0.03
-#: Seconds that a call for one configuration saves if it uses the fast function.
+#: Seconds that the fast function saves for each call with one configuration.
 _SAVED = 5e-5
 #: Seconds after which the cache folder is searched again for a kernel that it did not contain.
 _AGAIN = 0.05
 
-#: Modules that contain the kernels. `load_kernels` compiles the kernels of `_ONE_HALF` and `_OTHER_HALF` in
-#: two processes, so both groups take equally long.
+#: Modules that contain the kernels. `load_kernels` compiles the kernels `_ONE_HALF` in one process and the
+#: kernels `_OTHER_HALF` in another process. The compile times of these two groups are about equal.
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
 # -- when a kernel pays ----------------------------------------------------------------------------------
 
-#: The way to compute: with Python numbers, or with a compiled kernel.
+#: How to compute: "interpreted" with Python numbers, or "compiled" with kernels.
 Way = Literal["interpreted", "compiled"]
 
 _spent: dict[str, float] = {}
@@ -57,7 +57,7 @@ _only: list[Way] = []
 
 @contextmanager
 def only(way: Way) -> Iterator[None]:
-    """Compute everything in the given way while the context is open.
+    """While the context is open, always compute with kernels, or always compute without kernels.
 
     A test can thus compare results of Python numbers with results of kernels.
     """
@@ -78,7 +78,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 
     Args:
         name: Name of the kernel.
-        more: Seconds that the next computations will take without the kernel.
+        more: Estimated time (seconds) of the next computations if they do not use the kernel.
         home: Module of the kernel.
     """
     if _only and _only[-1] == "interpreted":
@@ -98,7 +98,8 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 def single_pays(name: str) -> bool:
     """Return whether to load the fast function (`SINGLE`) that calls the kernel `name` for one configuration.
 
-    Each call of `single_pays` counts as a call that the fast function would have accelerated.
+    Call this function once for each call of the user: it adds up the time that the fast function would have
+    saved.
     """
     if _only:
         return _only[-1] == "compiled"
@@ -146,8 +147,8 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 def _compile_beside(name: str, home: str) -> bool:
     """Start a second process that compiles a kernel, and return whether such a process runs.
 
-    Only one second process runs at a time, and there is only one attempt for each kernel. The result is also
-    True while the second process compiles another kernel.
+    At most one such process runs at a time, and it is started at most once for each kernel. The function also
+    returns True while the second process compiles another kernel.
     """
     if cache_folder() is None:
         return False
@@ -218,8 +219,8 @@ def load_kernels() -> None:
     """Compile every kernel, or read it from disk.
 
     Call this function before you start several processes; otherwise each of them compiles the kernels. A
-    process compiles on one processor only. A second process therefore compiles half of the kernels, and this
-    process then reads that half from disk.
+    process compiles on one processor only. Therefore, a second process compiles half of the kernels.
+    Afterwards, this process reads those kernels from disk.
     """
     missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
     helper = _compile_elsewhere(_OTHER_HALF) if missing else None

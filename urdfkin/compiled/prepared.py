@@ -1,9 +1,9 @@
 """Compute results of one frame for one configuration in fast calls, for control loops and solvers.
 
-The recursion is the same as for the methods of `Robot`. The kernel computes eight configurations at a time,
-and here all eight are the same configuration. Each function is bound to a program and to scratch memory, so a
-call passes only the arrays. If another thread is using the same function, the call uses `Robot` instead, with
-the same result.
+The recursion is the same as for the methods of `Robot`. A kernel computes eight configurations at a time;
+here, all eight are the same configuration. Each function has its own program and its own scratch memory, so
+the caller passes only the arrays. If another thread is using the function, `Robot` computes the same result
+instead.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
-#: A function of q, or q and v, or q, v and a, and of the output array or None.
-#: The function returns the result, or None for arguments that it does not support.
-#: If it returns None, `Robot` computes the result or raises the error.
+#: A function of joint coordinates, which is called as f(q, out), f(q, v, out) or f(q, v, a, out). The
+#: function returns the result, or None for arguments that it does not support. If it returns None, `Robot`
+#: computes the result or raises the error.
 Fast = Callable[..., FloatArray | None]
 
 
@@ -53,10 +53,10 @@ class PreparedFrame:
     """Fast evaluation of one frame in one reference frame; create it with `Robot.prepare`.
 
     Results are exactly the same numbers as those of `Robot`. With `verify=True`, urdfkin compares each result
-    with Pinocchio's result and allows the same difference as `Robot`. With `verify=False`, the robot's record
-    of checks counts the results as not checked. Contiguous float64 arrays are used directly. For other
-    arguments `Robot` computes the result, or raises the error, as usual. Several threads may share one
-    object, also on free-threaded Python.
+    with Pinocchio's result and allows the same difference as `Robot`. With `verify=False`, results are not
+    checked, and `Robot.certificate` reports them as unchecked. Contiguous float64 arrays are used directly.
+    For other arguments `Robot` computes the result, or raises the error, as usual. Several threads may share
+    one object, also on free-threaded Python.
 
     Attributes:
         frame: The frame's name.
@@ -83,10 +83,10 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether the user created this object with `Robot.prepare`.
-        #: If so, the first call compiles machine code.
+        #: Whether the user created this object with `Robot.prepare`. For such an object, the first call
+        #: compiles machine code.
         self.wanted = False
-        # At the first call, `_first` replaces each of these by a compiled function.
+        # At the first call of a quantity, `_first` replaces the quantity's attribute by a compiled function.
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
@@ -168,7 +168,8 @@ class PreparedFrame:
 
         Return None if the function would save less time than its creation takes.
         """
-        # `Robot` must normalise quaternions, and must check the results of large robots for overflow.
+        # The fast function neither normalises quaternions nor checks for overflow, so `Robot` computes these
+        # cases.
         robots = self._robot.tree.floating_joints or self._plan.is_large
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1):
             return None

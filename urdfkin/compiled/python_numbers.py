@@ -1,10 +1,9 @@
 """Number types with which Python runs the recursion without a compiler, for one configuration at a time.
 
 Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A
-product is
-stored as its two factors until it is added: x y + z is then one fused multiply-add, rounded once. `zero()`
-and `one()` are the constants 0 and 1. `nothing()` stands for a number that is not needed. Every number
-computed from `nothing()` is also `nothing()`.
+product x y is not computed at once. In the sum x y + z, the product and the sum are one fused multiply-add,
+which is rounded only once. `zero()` and `one()` are the constants 0 and 1. `nothing()` stands for a number
+that is not needed. Every number computed from `nothing()` is also `nothing()`.
 
 Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel takes
 addresses.
@@ -17,15 +16,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows.
-#: With N joints, the velocity of a joint is below LARGE^2 and the length of a path is below N LARGE^2.
-#: The largest product, w^2 d, is therefore below N^3 LARGE^6.
+#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows. For N
+#: joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2. An angular
+#: velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: The sum of this constant and a number below 2^51 is rounded to an integer. The lowest bits of the sum's
-#: mantissa are the number rounded to the nearest integer.
+#: If this constant is added to a number below 2^51, the sum is rounded to an integer. The lowest bits of the
+#: sum's mantissa are the integer nearest to the number.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -116,7 +115,7 @@ class Number:
 
 
 class Product:
-    """A product that is still stored as its two factors."""
+    """A product x y that is not computed yet; the attributes are its two factors."""
 
     __slots__ = ("x", "y")
 
@@ -155,9 +154,9 @@ class Product:
 
 
 class Known:
-    """The constant 0, the constant 1, or a number that is not needed.
+    """A number that simplifies products: the constant 0, the constant 1, or the unused number `nothing()`.
 
-    For a number that is not needed, `value` is None.
+    The attribute `value` of the unused number is None.
     """
 
     __slots__ = ("value",)
@@ -237,7 +236,10 @@ def number(s: Sequence[Number], row: int) -> Number:
 
 
 def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
-    """Return the number in a row of scratch memory; if `wanted` is `nothing()`, return `nothing()`."""
+    """Return the number in a row of scratch memory, or `nothing()` if the caller does not need the number.
+
+    The caller then passes `nothing()` as the argument `wanted`.
+    """
     return wanted if wanted is _NOTHING else s[row]
 
 
@@ -257,12 +259,12 @@ same = Number
 
 
 def numbers_of(array: Any) -> Any:
-    """Return the numbers of an array; in interpreted code the array is already a list of numbers."""
+    """Return the numbers of an array as a list; compiled code uses a pointer to the numbers instead."""
     return array.tolist()
 
 
 def numbers_at(address: Any) -> Any:
-    """Return the list of numbers that interpreted code passes instead of an address."""
+    """Return the argument, which is a list of numbers; compiled code has an address instead of a list."""
     return address
 
 
@@ -272,7 +274,7 @@ whole_numbers_at = numbers_at
 def read_rows(
     m: int, x: Sequence[float], at: int, stride: int, count: int, s: list[Number], row: int
 ) -> None:
-    """Read `count` numbers from the list x, from `x[at]` on, into rows of scratch memory."""
+    """Copy the numbers `x[at]`, `x[at + 1]` and so on to `count` rows of scratch memory."""
     s[row : row + count] = map(Number, x[at : at + count])
 
 
@@ -281,7 +283,7 @@ def write_rows(
 ) -> None:
     """Write `count` rows of scratch memory to the list `to`, from `to[at]` on.
 
-    The list `rows` has the indices of the rows, from `rows[first]` on.
+    The indices of these rows are `rows[first]`, `rows[first + 1]` and so on.
     """
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
@@ -292,12 +294,12 @@ def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Numbe
 
 
 def ordinary(total: Number) -> bool:
-    """Return whether a sum of squares is below the square of `LARGE`; it is not if a number was nan."""
+    """Return whether a sum of squares is below the square of `LARGE`; for nan, return False."""
     return total.x < LARGE * LARGE
 
 
 def all_written(*_: object) -> None:
-    """Do nothing: interpreted code writes through the caches, so it need not wait for memory."""
+    """Do nothing. Compiled code waits here until all results are in memory; Python need not wait."""
 
 
 stream = all_written

@@ -1,4 +1,4 @@
-"""The forward recursion of section 7.7 from the base outwards, link by link, for a block of configurations.
+"""The forward recursion of section 7.7 for a block of configurations: link by link, from the base outwards.
 
 The state of a link consists of:
 
@@ -9,10 +9,10 @@ The state of a link consists of:
 | alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
 The recursion expresses vectors in the axes of the requested result: world axes or the link's own axes. A
-rotation of the result at the end would add rounding errors. The equations are those of
-`urdfkin.kinematics.equations`. The equations are the same in world axes and in a link's own axes.
+rotation of the result at the end would add rounding errors. The equations are in the module
+`urdfkin.kinematics.equations`. They have the same form in world axes and in a link's own axes.
 
-If an output does not need a part of the state, this part is `nothing()` and costs no time.
+For example, a placement does not need velocities: an unused vector is `nothing()` and costs no time.
 
 This module and the modules `axes`, `outputs` and `recursions` contain plain functions that compute with the
 module `python_numbers`. The kernels are copies of these functions for Numba's number types
@@ -91,7 +91,10 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return the state of the same body for a frame that is rotated by S."""
+    """Return the state of a link after the axes of the link's frame are rotated by S.
+
+    The link's motion does not change.
+    """
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -135,9 +138,8 @@ def prismatic(axes, state, slide, v, a):
 def free(axes, state, o, u, o_rate, u_rate):
     """Add the velocity and the acceleration of a planar or floating joint to the state.
 
-    The joint's translation and rotation are already part of the state.
-
-    The joint's velocity and acceleration are given in the child link's axes.
+    The caller has already added the joint's translation and rotation. The joint's velocity and acceleration
+    are given in the child link's axes.
     """
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
@@ -241,7 +243,7 @@ def _save(s, row, state):
 
 
 def _resume(s, row, state):
-    """Return a saved state, but without the parts that this recursion does not need."""
+    """Read a link's state from scratch memory; read only the vectors that are needed."""
     R, p, w, vel, alpha, acc = state
     return (
         (_vector_if(R[0], s, row), _vector_if(R[1], s, row + 3), _vector_if(R[2], s, row + 6)),
@@ -257,7 +259,9 @@ def _resume(s, row, state):
 
 
 def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
-    """Read the needed blocks of eight numbers of `m` configurations, from configuration b on.
+    """Read numbers of `m` configurations from x into scratch memory; the first configuration has index b.
+
+    A configuration consists of blocks of eight numbers, and only the listed blocks are read.
 
     If x has one row, all configurations use this row. A block of eight numbers is read faster than a shorter
     block. If a configuration ends within a block, numbers of the next configuration are therefore read too,
@@ -275,7 +279,7 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
 def _start(axes, m, s, task, row, b):
     """Return the initial state of the recursion, which is the base's motion in the world.
 
-    In the textbook, this is the motion of frame 0 relative to frame -1.
+    The textbook calls the base frame 0 and the world frame -1.
     """
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
@@ -290,7 +294,10 @@ def _start(axes, m, s, task, row, b):
 
 
 def _sines_and_cosines(s, program, g):
-    """Compute the sines and cosines of all joint angles before the recursion, which needs all registers."""
+    """Compute the sines and cosines of all joint angles.
+
+    This is done before the recursion, because the recursion needs all registers.
+    """
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
@@ -325,8 +332,10 @@ def _along_link(axes, op, state, g, c):
 def _over_joint(axes, op, state, s, x, v, a, z, g, c):
     """Execute a joint's instruction.
 
-    The operands of the instruction are x, z and c. The arguments v and a are the scratch rows of the joint's
-    velocity and acceleration.
+    The arguments v and a are the scratch rows of the joint's velocity and acceleration. For a revolute joint,
+    x is the scratch row of the sine; for other joints, x is the scratch row of the first coordinate. For a
+    planar joint, z is the scratch row of the sine; for other joints, z is 1 for a mimic joint and 0
+    otherwise. The constants of a mimic rule begin at `g[c]`.
     """
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
@@ -379,7 +388,8 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
     at, stage = program[_CODE], task[_STAGE]
     to, first = (numbers_at(stage), 0) if stage else (numbers_at(task[_OUT]), b)
     if task[_BASE] == 0 and _CARRY_X <= program[at] <= _CARRY:
-        # The base is at rest at the world's origin: the first translation changes only the position.
+        # The base is at rest at the world's origin, so the first translation changes the position but no
+        # velocity.
         state = _shifted(state, _vector(g, program[at + 4]))
         at += WIDTH
     while program[at] != _END:
@@ -413,10 +423,10 @@ def forward_recursion(address, axes, orders, follow, keep, column, emit):
         address: Address of the kernel's arguments (`KernelArgs`).
         axes: `link_axes` or `world_axes`: the axes in which vectors are expressed.
         orders: Number of inputs that are read: 1 for q, 2 for q and v, 3 for q, v and a.
-        follow: Replaces the parts of a state that the output does not need by `nothing()`.
-        keep: Stores the data of a joint that are needed to compute the joint's Jacobian column.
-        column: Computes a column of the Jacobian, or of its derivative.
-        emit: Writes the result of a frame.
+        follow: Function that replaces the unused vectors of a link's state by `nothing()`.
+        keep: Function that stores what a joint's Jacobian column needs, for example the joint's axis.
+        column: Function that computes a column of J or of J-dot.
+        emit: Function that writes the result of a frame.
     """
     task = whole_numbers_at(address)
     program, g, s = whole_numbers_at(task[_PROGRAM]), numbers_at(task[_CONSTANTS]), numbers_at(task[_SCRATCH])

@@ -1,7 +1,7 @@
 """The recursions, one function for each quantity.
 
-A function takes its arguments in the form that `KernelArgs` describes. The function returns 1 if an input is
-nan, infinite or too large, else 0.
+The argument of a function is the address of the integers that `KernelArgs` describes. The function returns 1
+if an input is nan, infinite or too large, else 0.
 
 Python can run these functions without a compiler. The functions then take lists instead of addresses. The
 module `urdfkin.compiled.machine.kernels` contains compiled kernels with the same names. A compiled kernel

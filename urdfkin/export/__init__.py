@@ -1,4 +1,4 @@
-"""Export the kinematics of a robot's frame as code that runs without urdfkin and contains its own proof."""
+"""Export the kinematics of a robot's frame as code that runs without urdfkin and contains a self-test."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ LANGUAGES: dict[str, tuple[str, str, str]] = {
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
     "latex": ("urdfkin.export.latex", ".tex", "LaTeX formulas in the textbook's symbols"),
 }
-#: For each form of a chain: a summary in one line.
+#: Values of the argument `form` of `Robot.export`, with a short description.
 FORMS = {"tree": "the URDF's links", "dh": "its Denavit-Hartenberg table", "screws": "its screws"}
 #: Quantities that are exported by default.
 QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: Code, to: str) -> Code:
-    """Return the code with the constants and the proof of the language `to`: exact ones for sympy-exact.
+    """Return the code for the language `to`: with exact constants for sympy-exact, otherwise unchanged.
 
     Raises:
         VerificationError: Pinocchio computes another result than the exact expressions.

@@ -1,10 +1,10 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
 The exported code allocates no memory and has no global variables. Each function is straight-line code. In the
-arrays of a function, successive numbers of one configuration are `L` elements apart. For one configuration,
-L is 1. For a batch, L is the number of configurations that are computed together. A compiler then turns each
-line of code into one vector instruction. The parts of a file that do not depend on the robot are templates in
-`frames/`.
+arrays of a function, successive numbers of one configuration are `L` elements apart. For one configuration, L
+is 1. For a batch, L is the number of configurations that one call computes at the same time. A compiler then
+turns each line of code into one vector instruction. The parts of a file that do not depend on the robot are
+templates in `frames/`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 def framed(name: str, /, **parts: str | int) -> str:
     """Return a template in which each `@name@` is replaced by the text `parts[name]`.
 
-    A `@name@` inside an inserted text is not replaced.
+    If an inserted text contains such a `@name@`, the name is not replaced.
     """
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
@@ -83,7 +83,7 @@ def _head(code: Code) -> list[str]:
 
 
 def what(function: Function) -> str:
-    """Return a text with the shape and the equation numbers of a function's result."""
+    """Return the shape of a function's result and the numbers of its equations, as in "4 x 4, eq. 7.77"."""
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
@@ -136,7 +136,7 @@ def _function(code: Code, function: Function) -> str:
 
 
 def spare(code: Code, function: Function) -> int:
-    """Return the number of rows in which every input and the result have at least eight numbers."""
+    """Return the smallest number of configurations for which every array has at least eight numbers."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
@@ -147,7 +147,7 @@ def advance(code: Code, function: Function) -> str:
 
 
 class Layout:
-    """Layout of a function's inputs, angles, sines and cosines in the array `in`.
+    """The order in which the array `in` contains a function's inputs, angles, sines and cosines.
 
     All angles are adjacent: first the angles that are inputs, then the angles that are computed.
     """
@@ -162,7 +162,10 @@ class Layout:
         self.room = max(1, self.first + 3 * len(self.angles))
 
     def place(self, node: Node) -> int:
-        """Return the index in the array `in` of an input, an angle, a sine or a cosine."""
+        """Return the position of a value in the array `in`.
+
+        The value is an input, an angle, or the sine or cosine of an angle.
+        """
         if node.op in ("sin", "cos"):
             return self.place(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
@@ -252,7 +255,10 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main(code: Code, *frames: str) -> str:
-    """Return the text of a program that runs the test vectors, once for each frame of a check."""
+    """Return the text of a program that runs the test vectors.
+
+    The arguments `frames` are names of template files, for example "check_one.c".
+    """
     checks = (_check(code, function, frame) for function in code.functions for frame in frames)
     return framed("check.c", checks="".join(checks))
 

@@ -1,4 +1,4 @@
-"""The language-independent form of an export: the functions of one frame, their names and their proof."""
+"""The exported functions of one frame, before they are written in a programming language."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
-#: Precedence levels: a sum, a change of sign, a product, and an operand that needs no brackets.
+#: Precedence of operators, lowest first: a sum, a change of sign, a product, and an operand that needs no
+#: brackets.
 _SUM, _SIGN, _PRODUCT, _ATOM = range(4)
 _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
@@ -32,18 +33,22 @@ class Code:
 
     Attributes:
         name: Prefix of the names of functions.
-        robot: The robot's name. All names in this class are safe in a comment.
+        robot: The robot's name. A name in this class contains no characters that end a comment in the
+            exported file.
         frame: The frame's name.
         reference: The reference frame.
         functions: One function for each quantity.
         coordinates: Names of the coordinates of q.
         rates: Names of the coordinates of v and a.
         joints: Names of the path's moving joints.
-        words: Identifiers for the numbers of each input, by the input's letter, and for the path's joints.
-        about: Lines for the header that describe the table or the screws of the chain; empty for a URDF.
-        vouched: The proof; None for code that urdfkin compiles for itself.
-        exact: Function that returns the same code with exact constants; None if there is none, or if the
-            constants are exact.
+        words: Identifiers in the exported code. The keys "q", "v" and "a" have a list of identifiers for the
+            numbers of the input. The key "s" has a list of identifiers for the path's joints.
+        about: Lines of the file's header that contain the Denavit-Hartenberg table or the screws; empty for
+            code from a URDF's joints.
+        vouched: The comparison with Pinocchio and the test vectors; None for code that urdfkin compiles for
+            its own use.
+        exact: Function that returns this code with fractions instead of doubles as constants. None if there
+            is no such code, or if the constants are already exact.
     """
 
     name: str
@@ -61,7 +66,7 @@ class Code:
 
     @property
     def proof(self) -> Proof:
-        """The proof of the functions."""
+        """The comparison of the functions with Pinocchio, and the test vectors."""
         if self.vouched is None:
             raise ValueError("code that was not verified is not exported")
         return self.vouched
@@ -114,17 +119,17 @@ def code_of(
     verify: bool | None,
     about: str = "",
 ) -> Code:
-    """Make the code of a frame, with its proof.
+    """Return the code of a frame with test vectors and with the result of the comparison with Pinocchio.
 
     Args:
         verifier: Verifier of the robot.
-        plan_of: Function that returns the compiled tree for some links.
+        plan_of: Function that returns the compiled tree of the joints that move the given links.
         frame: Name of a link or joint.
         quantities: Names of quantities.
         reference: Reference frame of velocities, accelerations and Jacobians.
-        name: Prefix of the names of functions; None: made of the names of the robot and the frame.
+        name: Prefix of the function names. None: the prefix consists of the names of the robot and the frame.
         verify: As in `Robot.export`.
-        about: Text about the table or the screws of the chain, for the header.
+        about: Text for the file's header: the Denavit-Hartenberg table or the screws.
 
     Raises:
         UnknownNameError: the frame, a quantity or the reference is unknown.
@@ -164,7 +169,7 @@ def bare(
     reference: Reference,
     name: str,
 ) -> Code:
-    """Make the code of a frame without a proof."""
+    """Return the code of a frame without test vectors and without a comparison with Pinocchio."""
     coordinates, rates = coordinate_names(tree), rate_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
     return Code(
@@ -202,13 +207,14 @@ def _rows(names: Collection[str]) -> list[Quantity]:
 
 
 class Writer:
-    """Writer of a function's expressions as text, for any language with infix operators.
+    """Writes a function's expressions in a language in which a sum is written as a + b.
 
     Args:
-        code: The exported code, which contains the names.
+        code: The exported code, which contains the names of inputs and joints.
         function: A function of this code.
         literal: Function that writes a constant.
-        sine: Whether to write sine and cosine as operations; if not, they are inputs.
+        sine: Whether the written code computes sines and cosines. If False, they are inputs of the written
+            code.
     """
 
     def __init__(
@@ -235,7 +241,7 @@ class Writer:
         return [node for node in self.function.nodes if node.op in leaves and node in self.inside]
 
     def statements(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-        """Yield the comment and the statements (name, value) for each step of the path."""
+        """For each joint of the path, yield a comment and a list of assignments (name, value)."""
         nodes = [x for x in self.function.statements if x in self.inside and x.op not in self.leaves]
         for place, group in groupby(nodes, key=lambda node: node.place):
             found = list(group)
@@ -257,7 +263,7 @@ class Writer:
         return [self.text(x) for x in self.function.results]
 
     def text(self, x: Number, level: int = _SUM) -> str:
-        """Return an expression as an operand, in brackets if its precedence is below `level`."""
+        """Return an expression as text, in brackets if the precedence of its operator is below `level`."""
         if not isinstance(x, Node):
             return self.literal(float(x) if isinstance(x, int) else x)
         if x in self.own or x.op in self.code.words:
@@ -265,7 +271,7 @@ class Writer:
         return self.defined(x, level)
 
     def defined(self, x: Node, level: int = _SUM) -> str:
-        """Return the right-hand side of a statement."""
+        """Return the text of an expression, as on the right-hand side of an assignment."""
         if x.op in ("sin", "cos", "sqrt"):
             return f"{x.op}({self.text(x.of[0])})"
         if x.op == "neg":
@@ -273,14 +279,14 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # The brackets of a + (b + c) are kept, so that the code rounds as in the check with Pinocchio.
+            # The brackets of a + (b + c) remain, because the check with Pinocchio adds in this order, too.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return the text of an expression in terms of inputs only, without the names of statements.
+        """Return the text of an expression that contains inputs and constants, but no other variables.
 
-        Angles need this form, because the code computes them before its statements.
+        Angles are written like this, because the exported code computes angles before it assigns variables.
         """
         if not isinstance(x, Node):
             return self.literal(float(x))

@@ -188,7 +188,7 @@ def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
 
 
 class _Robot(Protocol):
-    """The parts of `Robot` that a compiled frame uses."""
+    """The attributes of `Robot` that the class `CompiledFrame` uses."""
 
     verifier: Verifier
 
@@ -203,11 +203,11 @@ class _Robot(Protocol):
 class CompiledFrame:
     """One frame of a robot in one reference frame, compiled; the result of `Robot.compiled`.
 
-    Results agree with the results of `Robot` within the error bound, but not to the last bit. The result of a
-    configuration has the same bits in a batch and in a single call. Inputs are checked: a wrong shape or a
-    number that is not finite is an error. The machine code is compared with Pinocchio once, on a hundred
+    Results agree with the results of `Robot` within the error bound, but not to the last bit. A configuration
+    has exactly the same result in a batch and in a single call. Inputs are checked: a wrong shape or a number
+    that is not finite is an error. The machine code is compared with Pinocchio once, on a hundred
     configurations, unless the robot is loaded with `verify=False`. The results of later calls are not
-    compared, and the certificate counts them as unchecked.
+    compared, and `Robot.certificate` reports them as unchecked.
 
     Attributes:
         frame: The frame's name.
@@ -344,7 +344,10 @@ class CompiledFrame:
         return found
 
     def _machine_code(self, row: Quantity) -> Any:
-        """Return the function `task`, compiled and checked once; None without a compiler."""
+        """Return the compiled C function of a quantity, or None without a C compiler.
+
+        The function is compiled and checked only once.
+        """
         with _compiling:
             if row.name not in self._batches:
                 self._batches[row.name] = self._make(row)
@@ -397,9 +400,9 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        For such arrays the general conversion of arguments (`Call`) is skipped. It would take a tenth of the
-        time of 100,000 accelerations: each large batch removes the conversion's code from the processor's
-        caches.
+        For such arrays the general conversion of arguments (`Call`) is skipped. This conversion would take a
+        tenth of the time of 100,000 accelerations. The reason is that each large batch removes the
+        conversion's code from the processor's caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(

@@ -1,8 +1,9 @@
 """Make exported functions with exact constants, for computer algebra.
 
-The constants are fractions: the URDF's decimals. If the double of an angle is the double of a multiple of
-pi/12, the angle is this multiple of pi. Roots, and sines and cosines of other angles, remain expressions. The
-recursion is that of `urdfkin.export.recursion`.
+The constants are the URDF's decimals as fractions. For example, the angle 1.5707963267948966 becomes pi/2. An
+angle becomes a multiple of pi/12 if rounding this multiple to a double gives the same number as rounding the
+angle. An irrational square root is not computed, but remains an expression. The same applies to the sine and
+cosine of an angle that is not a multiple of pi/2. The recursion is that of `urdfkin.export.recursion`.
 """
 
 from __future__ import annotations
@@ -29,9 +30,10 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, Kind, enough_digits, exact, precision, read_exact
 from urdfkin.verify.verifier import Verifier
 
-#: Largest angle that can be a multiple of pi, rad. Neighbouring doubles are far closer than two multiples.
+#: Larger angles (rad) are not replaced by a multiple of pi. Below this angle, the distance between doubles is
+#: far smaller than the distance between multiples of pi/12.
 _LARGEST = 100.0
-#: Sine and cosine of a number of right angles.
+#: Sine and cosine of 0, pi/2, pi and 3 pi/2.
 _RIGHT = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
 
@@ -55,7 +57,7 @@ class ExactGraph(Graph):
     """The expressions of a function with exact constants.
 
     Attributes:
-        recognised: The angles of the URDF that became multiples of pi, and these multiples.
+        recognised: The angles of the URDF that were replaced by multiples of pi, and these multiples.
     """
 
     zero = 0
@@ -105,9 +107,9 @@ def exact_plan(
     """Return a link's compiled tree with the exact constants of the URDF text.
 
     Args:
-        graph: The graph of the function that uses the compiled tree.
+        graph: The graph in which the exact constants are created.
         text: The URDF text.
-        tree: The tree of the same text.
+        tree: The robot's joints, which were read from the URDF text.
         plan: The compiled tree of the link.
         link: Index of the link.
     """
@@ -143,13 +145,13 @@ def _aligning(axis: Vector, z: float) -> Matrix:
 
 
 def ball(x: Number) -> Number:
-    """Return an exact constant as a ball."""
+    """Return an exact constant as an interval, which consists of a midpoint and a radius."""
     if isinstance(x, PiMultiple):
         return exact(0).pi() * ball(x.factor)
     return exact(x.numerator) / x.denominator if isinstance(x, Fraction) else exact(x)
 
 
-#: The operations on balls.
+#: The operations on intervals.
 _OPERATIONS: dict[str, Callable[..., Number]] = {
     "+": lambda x, y: x + y,
     "-": lambda x, y: x - y,
@@ -163,7 +165,7 @@ _OPERATIONS: dict[str, Callable[..., Number]] = {
 
 
 def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]:
-    """Return the results of a function with exact constants, for one configuration, as balls."""
+    """Return the results of a function with exact constants, for one configuration, as intervals."""
     value: dict[Any, Number] = {}
 
     def of(x: Number) -> Number:
@@ -179,11 +181,11 @@ def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]
 
 @dataclass(frozen=True)
 class ExactProof(Proof):
-    """The proof of a file with exact constants.
+    """The checks of an exported file with exact constants: test vectors and the comparison with Pinocchio.
 
     Attributes:
-        angles: Number of different angles of the URDF that became multiples of pi.
-        most: Largest change of such an angle, rad.
+        angles: Number of different angles of the URDF that were replaced by multiples of pi.
+        most: Largest difference between one of these angles and its multiple of pi, rad.
     """
 
     angles: int = 0
@@ -212,18 +214,18 @@ def exact_functions(
     proof: Proof,
     verify: bool | None,
 ) -> tuple[tuple[Function, ...], ExactProof]:
-    """Return functions with exact constants, and their proof.
+    """Return functions with exact constants, and the result of their comparison with Pinocchio.
 
-    The expressions are evaluated at fifty digits and compared with Pinocchio. The test vectors are those of
-    the other functions.
+    The expressions are evaluated at fifty digits and compared with Pinocchio. The test vectors are the same
+    as for the functions with constants in double precision.
 
     Args:
         verifier: Verifier of the robot.
-        plan_of: Function that returns the compiled tree for some links.
+        plan_of: Function that returns the compiled tree of the joints that move the given links.
         frame: Name of a link or joint.
         reference: Reference frame.
         functions: The functions with constants in double precision.
-        proof: Their proof.
+        proof: The checks of these functions: test vectors and the comparison with Pinocchio.
         verify: As in `Robot.export`.
 
     Raises:

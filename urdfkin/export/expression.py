@@ -1,12 +1,12 @@
 """Define symbolic numbers.
 
-Arithmetic with these numbers builds a graph of expressions, from which code is written.
+Arithmetic with these numbers creates a graph of expressions. urdfkin writes code from this graph.
 
 The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
-The graph simplifies each expression when it is created. Constants are Python floats, and operations on
-constants are computed at once. Products with 0 and 1 and sums with 0 are removed. A minus sign is moved out
-of products, and turns a sum into a difference. Equal expressions are the same node, so the sine and the
-cosine of each joint occur once.
+The graph simplifies each expression when it is created. Constants are Python floats, so an operation on
+constants is computed and not stored in the graph. Products with 0 and 1 and sums with 0 are removed. A
+product (-x) y becomes -(x y), and a sum x + (-y) becomes the difference x - y. Equal expressions are the same
+node, so the sine and the cosine of each joint occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.input("q", 0), graph.input("q", 1)
@@ -34,10 +34,12 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        of: The operands, which are nodes and constants. For an input, `of` is its index in q, v or a.
-        index: Number in the order of creation. Operands are created first, so their numbers are smaller.
-        place: Index of the step of the recursion that created it.
-        equation: Numbers of the equation that created it; "" if it has none.
+        of: The operands, which are nodes and constants. For an input such as q[3], `of` contains the index 3.
+        index: Number of the expression in the order of creation. An expression is created after its operands,
+            so its number is larger than theirs.
+        place: Number of the joint on the path at which the recursion created this expression.
+        equation: Numbers of the textbook's equation that this expression belongs to, for example "7.127"; ""
+            if there is no number.
         name: Name in the code; "" for no name.
     """
 
@@ -76,7 +78,7 @@ class Node:
 
     @property
     def operands(self) -> list[Node]:
-        """The operands that are expressions, without the constants."""
+        """The operands that are not constants."""
         return [x for x in self.of if isinstance(x, Node)]
 
 
@@ -90,7 +92,7 @@ class Graph:
             nodes that it creates.
     """
 
-    #: The result of a product with zero, and of x - x.
+    #: The constant that replaces expressions such as 0 x and x - x.
     zero: float = 0.0
 
     def __init__(self) -> None:
@@ -103,7 +105,7 @@ class Graph:
         return self.made(letter, place)
 
     def made(self, op: str, *of: Any) -> Node:
-        """Return the node of an operation. Equal operations with equal operands have the same node."""
+        """Return the node of an operation. Two equal operations with the same operands have the same node."""
         key = (op, *of)
         if (node := self._made.get(key)) is None:
             node = self._made[key] = Node(self, op, of, len(self._made))
@@ -155,11 +157,9 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Wrap the function of an equation.
+        """Return a function that computes an equation and stores its number in each new expression.
 
-        The wrapper also stores the numbers of the equation in each new node.
-
-        If another equation calls this function, the numbers of the calling equation are stored.
+        If one equation calls another, each new expression stores the number of the calling equation.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:

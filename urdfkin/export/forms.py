@@ -1,4 +1,4 @@
-"""Export a chain as code, with the steps of the URDF's joints, of a Denavit-Hartenberg table, or of screws.
+"""Export a chain as code that follows the URDF's joints, the rows of a Denavit-Hartenberg table, or screws.
 
 `urdfkin.load` converts a table or a product of exponentials to a robot, with one joint for each row or screw.
 The code is generated from this robot.
@@ -58,7 +58,7 @@ def code_of_chain(
     name: str | None = None,
     verify: bool = True,
 ) -> Code:
-    """Return the exported code of a chain's last frame, with its proof.
+    """Return the exported code of a chain's last frame, with test vectors and the comparison with Pinocchio.
 
     The code has one step for each row of the table, or for each screw. Results are in the axes of the chain's
     base.

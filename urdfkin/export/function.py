@@ -2,9 +2,9 @@
 
 A function computes one quantity of one frame.
 
-An expression becomes a statement with a name if it is used more than once, or if it is a number of a link's
-state. Sines, cosines, roots and quotients also become statements. A long expression is split into several
-statements. All other expressions are written where they are used.
+The exported code assigns an expression to a variable if it is used more than once, or if it is a number of a
+link's state. Sines, cosines, roots and quotients are also assigned to variables. A long expression is split
+into several assignments. All other expressions are written where they are used.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from urdfkin.verify.quantities import Quantity
 
 #: Letters of the inputs.
 INPUTS = ("q", "v", "a")
-#: Operations that always become statements of their own.
+#: Operations whose result the exported code always assigns to a variable.
 _ALWAYS = ("sin", "cos", "sqrt", "/")
 #: Largest number of operations in a statement.
 _LONGEST = 12
@@ -38,9 +38,9 @@ class Function:
     """Straight-line code for one quantity.
 
     Attributes:
-        quantity: The quantity's row in the table of quantities.
+        quantity: The quantity that the function computes, for example the placement.
         reference: The reference frame.
-        plan: The compiled tree of the path.
+        plan: The compiled tree of the joints from the base to the frame.
         results: The numbers of the result, row by row. Each number is a constant or an expression.
     """
 
@@ -66,7 +66,7 @@ class Function:
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """All expressions that the results need, in an order in which they can be computed."""
+        """All expressions that the results need. An expression comes after its operands."""
         return needed(self.results)
 
     @cached_property
@@ -82,7 +82,7 @@ class Function:
 
     @cached_property
     def statements(self) -> list[Node]:
-        """The expressions that the code assigns to variables, in the order of computation."""
+        """The expressions that the code assigns to variables, in the order of the assignments."""
         uses = Counter[Node]()
         for value in self.results:
             if isinstance(value, Node):
@@ -103,7 +103,7 @@ class Function:
     def within(self, leaves: Collection[str]) -> set[Node]:
         """Return the expressions that the results need.
 
-        The operands of the operations in `leaves` are left out.
+        The operands of an operation in `leaves` are not included.
         """
         waiting, found = [x for x in self.results if isinstance(x, Node)], set[Node]()
         while waiting:
@@ -145,9 +145,9 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return the operand x of a node -x; return other nodes unchanged.
+    """Return x for an expression -x; return other expressions unchanged.
 
-    The code contains -x only where it is used, so -x is never a statement.
+    The exported code never assigns -x to a variable.
     """
     return node.of[0] if node.op == "neg" else node
 
@@ -158,10 +158,10 @@ def function_of(
     """Return the function that computes a quantity for the only frame of a compiled tree.
 
     Args:
-        plan: The compiled tree of the path.
+        plan: The compiled tree of the joints from the base to the frame.
         quantity: A quantity that can be exported.
         reference: The reference frame.
-        graph: The graph that contains exact constants of the compiled tree. None: the constants are doubles.
+        graph: The graph in which the tree's exact constants were created. None: the constants are doubles.
     """
     graph = graph or Graph()
 

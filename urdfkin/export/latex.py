@@ -1,7 +1,7 @@
 r"""Write a LaTeX document with the formulas of the straight-line code, in the textbook's symbols.
 
-The index of a joint's symbols is the joint's number on the path. A list at the beginning of the document
-contains the joints' names.
+Symbols such as s_2 and R^(2) belong to the joint with this number on the path. A list at the beginning of the
+document contains the joints' names.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
-The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's.
-When a user runs the file, its test vectors check the file and also the user's compiler, language version and
-libraries. The test vectors contain true values at fifty digits, computed from the URDF's
-decimals. For each number they also contain the error bound of a correct computation, in eps of the precision
-used. The inputs are single-precision numbers, so they are equal in single and in double precision.
+The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's. When
+a user runs the file, its test vectors check the file and also the user's compiler, language version and
+libraries. The test vectors contain true values at fifty digits, computed from the URDF's decimals. For each
+true value they also contain a bound on the rounding errors of a correct computation. The unit of the bound is
+the eps of the file's precision. The inputs are single-precision numbers, so they are equal in single and in
+double precision.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ class Vector:
 
 @dataclass(frozen=True)
 class Proof:
-    """The proof of an exported file.
+    """The checks of an exported file: test vectors and the comparison with Pinocchio.
 
     Attributes:
         sha256: SHA-256 of the URDF's text.
@@ -98,7 +99,7 @@ class Proof:
 
     @property
     def lines(self) -> list[str]:
-        """The proof in words."""
+        """Lines of text for the file's header that describe the checks."""
         oracle = quiet(self.certificate.oracle)
         if not self.certificate.verified:
             reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"
@@ -207,9 +208,10 @@ def _single(x: FloatArray) -> FloatArray:
 
 
 def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatArray, FloatArray]:
-    """Return two arrays (n, numbers) for a function's results: the error bounds and the scales.
+    """Return the error bounds of a function's results, and the scales of these bounds, as arrays.
 
-    An error bound is k * scale, in eps.
+    The first array (n, numbers) contains k * scale, because an error bound is k * scale * eps. The second
+    array (n, numbers) contains the scales.
     """
     v, a = (*part.rates, None, None)[:2]
     size = against_true_values(part.plan, part.q, v, a, errors)

@@ -1,7 +1,7 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. The code for JAX and PyTorch is the code for any array API
-namespace, with the function names of JAX or PyTorch.
+The expressions are the same for all libraries. The code for JAX and PyTorch resembles the code for any array
+API namespace, but it calls the functions of JAX or PyTorch.
 """
 
 from __future__ import annotations
@@ -28,18 +28,19 @@ class Dialect:
     Attributes:
         about: Description of a function's inputs and results.
         imports: Import lines. The placeholder `{}` is replaced by the functions `cos`, `sin` and `sqrt` that
-            the code uses. If the code uses none of them, the lines with a placeholder are removed.
-        result: Function that yields the lines of code that return the results of a written function.
-        values: Body of the written function `_values(function, inputs)`, which returns the results for a list
-            of configurations.
-        decorator: The decorator's line before each written function; "" if there is none.
-        entering: Function that takes the writer of a function and returns the function's first lines.
-        helpers: Code of functions that the written functions call; "" if there are none.
-        index: Format of an element of an input in the code: the default `{}[{}]` gives, for example, `q[0]`.
-        given: Parameter of the written check, with its default; "" if there is none.
+            the code uses. Lines with a placeholder are removed from code without sines, cosines and roots.
+        result: Function that yields the last lines of an exported function, which return its results.
+        values: Body of the function `_values(function, inputs)` of the exported file. `_values` returns the
+            results of an exported function for a list of configurations.
+        decorator: Line with the decorator of each exported function; "" for no decorator.
+        entering: Function that returns the first lines of an exported function, for example the checks of its
+            inputs.
+        helpers: Code of helper functions that the exported functions call; "" for no helpers.
+        index: Pattern for one number of an input. The default `{}[{}]` gives, for example, `q[0]`.
+        given: Parameter of the exported file's self-test, with a default value; "" for no parameter.
         single: Whether the functions also compute in single precision.
-        closing: Function that returns code after the written functions.
-        after: Last lines of the written program; "" if there are none.
+        closing: Function that returns further code, which follows the exported functions in the file.
+        after: Last lines of the exported file's self-test; "" for no such lines.
         exact: Whether constants are exact.
     """
 
@@ -63,7 +64,10 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields code which writes the results into an array, element by element."""
+    """Return a function that yields lines of code.
+
+    These lines assign each result to an element of an array.
+    """
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -108,7 +112,10 @@ def _shapes(writer: Writer) -> list[str]:
 
 
 def _zero(writer: Writer, xp: str) -> str:
-    """Return the line of code that defines zeros of the batch shape, with the inputs' type and device."""
+    """Return the line of code that creates an array of zeros.
+
+    The array has the batch shape, the type and the device of the inputs.
+    """
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
@@ -144,7 +151,10 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields code which stacks the results, for libraries with immutable arrays."""
+    """Return a function that yields lines of code.
+
+    These lines create an array from all results, for libraries with immutable arrays.
+    """
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -248,7 +258,7 @@ def gradients(device="cpu"):
 
 def _torch_module(code: Code) -> str:
     """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
-    # `forward` computes the function with the fewest inputs, so that q is its only input if possible.
+    # The method `forward` computes the function with the fewest inputs, usually a function of q.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,
@@ -267,7 +277,7 @@ def _rate(plan: CompiledTree) -> float:
     The bound for floating joints is at least 3. If one number of a unit quaternion changes by t, the body
     rotates about a fixed axis. Let x be the angle between the quaternion and the direction of the change. The
     derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a product of
-    F vectors, the third derivative is then at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
+    F rotated vectors, the third derivative is at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
     """
     floats = bool((plan.steps[:, Step.KIND] == Motion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))

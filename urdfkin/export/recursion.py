@@ -1,11 +1,11 @@
-"""Apply the forward recursion of the textbook's section 7.7 to one path, for any kind of number.
+"""Compute the forward recursion of the textbook's section 7.7 for one path, for any type of number.
 
-The compiled tree of a frame is a sequence of steps. Each step is a translation along a rigid link, a constant
-rotation and the motion of a joint about or along z. Placements and Jacobians are computed in the axes of the
-world frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame,
-where joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes of the world
-frame, it is then rotated joint by joint. These rotations take a third fewer operations than a computation of
-the rotation matrix R.
+The recursion goes from joint to joint. At each joint, it translates along the rigid link, applies a constant
+rotation, and then applies the motion of the joint about or along z. Placements and Jacobians are computed in
+the axes of the world frame, as in the textbook. Velocities and accelerations are computed in the axes of each
+link's frame, where joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes
+of the world frame, it is then rotated joint by joint. To rotate the result needs a third fewer operations
+than to compute the rotation matrix R.
 
 `urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree.
 """
@@ -30,13 +30,13 @@ class Kind:
     """A kind of number.
 
     Attributes:
-        chapter: A module with the textbook's equations, which compute with numbers of this kind.
+        chapter: A module with the textbook's equations as functions that accept numbers of this kind.
         sine_cosine: Function that returns sine and cosine of an angle.
         root: Function that returns the square root.
-        entering: Function that is called before each step, then before the final frame, and then before the
-            results. Its argument counts these calls from 0.
-        reached: Function that is called after each step and after the final frame. Its arguments are the
-            index of the call and the new state.
+        entering: Function that the recursion calls at each joint, at the final frame, and before the results.
+            The argument of the function is the number of earlier calls.
+        reached: Function that the recursion calls after each joint and after the final frame. The arguments
+            of the function are the number of earlier calls and the new state.
     """
 
     chapter: Any
@@ -52,14 +52,14 @@ class TreeRecursion(Recursion):
     Args:
         plan: The compiled tree of one frame.
         kind: The kind of number.
-        inputs: q, v and a; zeros where they are not needed.
+        inputs: q, v and a. An input that is not needed consists of zeros.
         own: Whether the motion of each link is computed in the axes of the link's own frame.
 
     Attributes:
         states: The state after each step.
         end: The state of the frame.
-        turns: The rotations from the axes of each frame to the axes of the previous frame, in order from the
-            base.
+        turns: Rotation matrices from the axes of each frame to the axes of the previous frame. The first
+            matrix belongs to the frame next to the base.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class TreeRecursion(Recursion):
         kind.entering(len(self.states) + 1)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Rotate the frame of a state by S, and append S to `turns`."""
+        """Rotate the axes of a link's frame by S, and add the rotation to the list `turns`."""
         self.turns.append(S)
         return super().turned(s, S)
 
@@ -135,8 +135,8 @@ def _without_rounding(x: Sequence[float]) -> Vector:
     """Return a constant vector in which entries below the rounding of the largest entry are replaced by 0.
 
     For example, the cosine of the double nearest to pi/2 is 6e-17. Without this function, the exported code
-    would contain useless products with such numbers. The bound of `urdfkin.kinematics.roundings` includes the
-    error of this change. Exact constants have no rounding.
+    would contain useless products with such numbers. The error bounds of `urdfkin.kinematics.roundings`
+    include the error that this replacement causes. Exact constants have no rounding.
     """
     if not all(isinstance(c, float) for c in x):
         return x[0], x[1], x[2]

@@ -1,10 +1,10 @@
 """Bound the rounding errors of an exported function in single precision, for each number of its result.
 
 The code in a file is a list of operations. Each operation and each constant has a rounding error. To first
-order in eps, the error of a result is a sum over the operations and constants. Each term is the rounding
-error, multiplied by the derivative of the result with respect to that operation or constant. The bound is the
-sum of the absolute values of the terms. One backward pass over the operations computes the derivatives of all
-results.
+order in eps, the error of a result is a sum over the operations and constants. The error of the result caused
+by one operation is the operation's rounding error times the derivative of the result with respect to the
+operation. The same is true for a constant. The bound is the sum of the absolute values of these products. One
+backward pass over the operations computes the derivatives of all results.
 
 `urdfkin.kinematics.roundings` derives the error of one operation.
 """
@@ -26,7 +26,7 @@ from urdfkin.kinematics.roundings import (
 )
 from urdfkin.model.tree import FloatArray
 
-#: Number of results whose derivatives are computed in one backward pass; it limits the memory.
+#: Number of results whose derivatives are computed in one backward pass. A larger number needs more memory.
 _TOGETHER = 512
 #: For each operation, the derivatives of its value with respect to its operands.
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
@@ -46,7 +46,7 @@ def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArra
     """Return the bounds (n, results) on the errors in single precision, in eps = 2^-23.
 
     The bounds do not include the rounding errors of the code's constants in double precision. A bound is inf
-    if a number of the code is beyond the range of single precision.
+    if a number that the code computes is beyond the range of single precision.
 
     Args:
         function: The function.
@@ -65,9 +65,10 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def reach(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives of the results `columns` with respect to x.
+        """Add `slope` to the derivatives, with respect to x, of the results with indices `columns`.
 
-        If x is a constant, add the effect of its error to the bounds of these results.
+        If x is a constant, add its rounding error, multiplied by `slope`, to the bounds of these results
+        instead.
         """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant(x)
@@ -93,7 +94,7 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
 def _own(node: Node, x: FloatArray) -> FloatArray:
     """Return the rounding error (n,) of one operation with exact operands, in eps.
 
-    The results of the operation are x (n,).
+    The array x contains the results of the operation for n configurations.
     """
     size = np.abs(x)
     if node.op in INPUTS:
@@ -106,12 +107,12 @@ def _own(node: Node, x: FloatArray) -> FloatArray:
 
 
 def _constant(x: float) -> float:
-    """Return the error of a constant, in eps: its rounding to single precision."""
+    """Return the error, in eps, of a constant that is rounded to single precision."""
     size = np.abs(x)
     return float(_in_range(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
 
 
 def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Add the errors of numbers that underflow; set the errors of numbers that overflow to inf."""
+    """Add an error for each number that underflows, and return inf for each number that overflows."""
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

@@ -93,16 +93,16 @@ _MOST_NUMBERS = (2**63 - 1) // 8
 class Robot(Displayable):
     """A loaded robot and its kinematics; make one with `urdfkin.load`.
 
-    A configuration `q` has shape (..., nq). Joint velocities `v` and joint accelerations `a` have shape
-    (..., nv). Each may have any leading batch axes; the batch axes of the three broadcast against each other.
-    The order of joints and the meaning of `v` are Pinocchio's.
+    A configuration `q` has shape (..., nq). Joint velocities `v` and joint accelerations `a` have shape (...,
+    nv). Arrays `q`, `v` and `a` may have leading batch axes, which broadcast as in NumPy. The order of joints
+    and the meaning of `v` are Pinocchio's.
 
     Each of `q`, `v` and `a` may be given in one of four forms:
 
     - numbers in order: `[0.5, 2.0]`
     - a mapping: `{"elbow": 0.5, "wrist": "30deg"}`; its values may be batches
     - a text with names: `"elbow=0.5, wrist=2"`
-    - a pose of `poses`, with or without changes: `"ready"`, `"ready, elbow=0.5"`
+    - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
 
     A missing name is an error.
 
@@ -163,8 +163,8 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Bounds on the errors of link and joint poses that single precision in the file causes. None if the
-        #: numbers have double precision.
+        #: For a USD stage with numbers in single precision: bounds on the resulting errors of link and joint
+        #: poses. None if the numbers have double precision.
         self.single: SinglePrecision | None = None
         #: For a robot from a USD stage: the path of the prim of each link.
         self.prims: Mapping[str, str] = {}
@@ -172,7 +172,8 @@ class Robot(Displayable):
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: Evaluators by frame: `_prepared` for unchecked calls, `_checked` for checked calls.
+        #: Fast evaluators of frames. Those in `_prepared` do not check results, and those in `_checked` check
+        #: each result.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
@@ -484,8 +485,8 @@ class Robot(Displayable):
     def sample(self, n: int, seed: int = 0) -> FloatArray:
         """Draw random configurations (n, nq) within the limits, those of mimic joints included.
 
-        The same seed gives the same configurations. It is possible that no value of a mimicked joint
-        satisfies both its own limits and those of the mimic joint. Then only its own limits apply, and
+        The same seed gives the same configurations. In some robots, no value of a mimicked joint satisfies
+        the joint's own limits and those of its mimic joint. For such a joint only its own limits apply, and
         `limit_violations` names the mimic joint.
 
         Args:
@@ -733,11 +734,11 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return a quantity by its name; the result equals that of the method of the same name.
+        """Compute the quantity with the given name; the method with this name returns the same result.
 
         Args:
             name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
-            inputs: The inputs of the method of that name, in order: (q,), (q, v) or (q, v, a).
+            inputs: A tuple: (q,), (q, v) or (q, v, a), depending on the quantity.
 
         Raises:
             UnknownNameError: the quantity or the frame does not exist.
@@ -895,9 +896,10 @@ class Robot(Displayable):
         """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion.
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
-        In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes or the point move.
-        The linear part of the spatial acceleration is the linear part of the classical acceleration minus w x
-        vel. If the base moves, you must add the acceleration that the base causes.
+        In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. The reason is that the axes (LOCAL)
+        or the body point (WORLD) change with time. The linear part of the spatial acceleration is the linear
+        part of the classical acceleration minus w x vel. If the base moves, you must add the acceleration
+        that the base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -926,12 +928,14 @@ class Robot(Displayable):
         - Joint j before joint i: z_j rotates the column, z_j x (z_i x d_i).
         - Joint j after joint i: z_j moves the end of the lever arm, z_i x (z_j x d_j).
 
-        WORLD has only terms of the first kind. LOCAL has only terms of the second kind.
+        In WORLD, a joint j after joint i contributes nothing. In LOCAL, a joint j before joint i contributes
+        nothing.
 
         Symmetry in LOCAL_WORLD_ALIGNED: the linear rows are symmetric in i and j, except within one planar or
-        floating joint. Let w_i be the angular rows of column i of J. The angular rows at [i, j] and [j, i]
-        differ by w_j x w_i, unless both columns belong to one floating joint. The difference is 0 for
-        parallel axes. All angular rows are 0 on a planar arm.
+        floating joint. The angular rows are not symmetric: the angular part of H[..., i, j] minus that of
+        H[..., j, i] is w_j x w_i. Here w_i is the angular part of column i of J. This is not true for two
+        columns of one floating joint. The difference is 0 for parallel axes. On a planar arm, all angular
+        rows are 0.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link", verify=False)
@@ -1212,11 +1216,11 @@ class Robot(Displayable):
     ) -> Enclosures:
         """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
-        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130, without rounding. Their inputs are the
-        decimals in the URDF and the exact doubles of `q`, `v`, `a` and `base`. Each end of an interval is a
-        double, and the two ends are nearly always neighbouring doubles. The result also states whether
-        urdfkin's and Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each
-        joint before the frame.
+        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130, without rounding. The true values are
+        computed from the decimals in the URDF and from the exact doubles of `q`, `v`, `a` and `base`. Each
+        end of an interval is a double, and the two ends are nearly always neighbouring doubles. The result
+        also states whether urdfkin's and Pinocchio's values lie in the intervals. The computation takes less
+        than 1 ms for each joint before the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1226,9 +1230,9 @@ class Robot(Displayable):
             reference: Reference frame of velocities, accelerations and Jacobians.
             base: Motion of the root link; None: fixed at the world origin.
             digits: Decimal digits of the interval arithmetic, at least 15. If None, there are 30 digits plus
-                one for each joint before the frame. With this number of digits, the ends are nearly always
-                neighbouring doubles. With 15 digits, the intervals are about as wide as the rounding errors
-                of doubles.
+                one for each joint before the frame. With this number of digits, the two ends of an interval
+                are nearly always neighbouring doubles. With 15 digits, the intervals are about as wide as the
+                rounding errors of doubles.
             hessian: Whether to enclose the Hessian too. This takes less than 0.1 ms for each pair of joints.
 
         Raises:
@@ -1331,10 +1335,11 @@ class Robot(Displayable):
             frame: Name of a link or joint; None: `tip_frame`.
             quantities: Any of "placement", "velocity", "jacobian", "jacobian_rate", "acceleration".
             reference: Reference frame of velocities, accelerations and Jacobians.
-            form: "tree": the steps are the URDF's joints. "dh": the rows of the table from `base_frame` to
-                the frame. "screws": the screws of this path. Results of "dh" and "screws" are in the axes of
-                `base_frame`.
-            name: Prefix of the function names; None: made of the names of the robot and the frame.
+            form: "tree": the code computes the pose from the URDF's joints. "dh": from the Denavit-Hartenberg
+                table from `base_frame` to the frame. "screws": from the product of exponentials of this path.
+                Results of "dh" and "screws" are in the axes of `base_frame`.
+            name: Prefix of the function names. None: the prefix consists of the names of the robot and the
+                frame.
             verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
                 unchecked code states UNVERIFIED.
 
@@ -1371,8 +1376,8 @@ class Robot(Displayable):
 
         Args:
             frame: As in `export`.
-            quantities: As in `export`. `module(q)` returns the first of these quantities that depends on q
-                alone.
+            quantities: As in `export`. `module(q)` returns the first quantity in this list that is a function
+                of q only, for example the placement.
             reference: As in `export`.
             verify: As in `export`.
 
@@ -1416,7 +1421,7 @@ class Robot(Displayable):
         )
 
     def select(self, path: FrameChain | DHTable, q: Given) -> FloatArray:
-        """Return the coordinates of a chain or table, (..., coordinates), from the robot's `q` (..., nq).
+        """Return the n coordinates (..., n) of a chain or table, selected from the robot's `q` (..., nq).
 
         Args:
             path: A result of `chain` or `dh`.
@@ -1461,18 +1466,22 @@ class Robot(Displayable):
             convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
             near_parallel: Row type for nearly parallel axes, "hayati" or "strict".
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
-            last: "tip": the last row ends at the tip. "flange": the last row ends at the flange, and the tool
-                transform leads to the tip.
-            parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the row
-                of the last of these axes. "first": the row of the first one. "each": each row contains
-                the offset of its own link.
-            flip: Names of joints with the opposite sense in the table.
+            last: "tip": the table leads to the tip. "flange": the table leads to the flange, and a separate
+                tool transform leads from the flange to the tip.
+            parallel_offset: If consecutive joint axes are parallel, the table may store the offset along them
+                in one row or in several rows. "last": in the row of the last parallel axis. "first": in the
+                row of the first parallel axis. "each": the row of each parallel axis contains the offset of
+                its own link.
+            flip: Names of joints whose positive direction is reversed in the table.
             first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
-            sign: Rule for the direction of x: "theta" (smallest), "a" or "alpha" (not negative).
-            slide: Line of a prismatic joint. "drawn": the same line as in the URDF. "minimal": the line
-                through the next revolute joint's origin, so that a is 0.
-            like: A published table. The new table gets the frames, signs and zero positions of this one;
-                `flip`, `first`, `last`, `sign` and `parallel_offset` are then ignored.
+            sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
+                length a is not negative. "alpha": the angle alpha is not negative.
+            slide: Position of the axes of prismatic joints. "drawn": the axis passes through the joint's
+                origin in the URDF. "minimal": the axis passes through the origin of the next revolute joint,
+                so that a is 0.
+            like: A published table. The new table has the same frames, signs and zero positions as the
+                published table. The arguments `flip`, `first`, `last`, `sign` and `parallel_offset` are
+                ignored if `like` is given.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
@@ -1639,9 +1648,10 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         """Return the fast evaluator of a frame, which is made at the first call."""
-        # For a name with the usual reference frame, the key is the name. This saves time, because the hash of
-        # an enumeration member is slow. Other keys also contain the types: an enumeration member would
-        # otherwise equal its number, and `LinkFrame("link:a")` would equal the name "link:a".
+        # If the reference frame is the default and `frame` is a string, this string is the dictionary's key.
+        # This saves time, because the hash of an enumeration member is slow. Other keys also contain the
+        # types: an enumeration member would otherwise equal its number, and `LinkFrame("link:a")` would equal
+        # the name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
@@ -1658,8 +1668,8 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: Patterns for list items: of a list in the docstring of `Robot`, and of the section `Args` or `Raises` of a
-#: method.
+#: Regular expressions for items of a list: in the docstring of `Robot`, and in the section `Args` or `Raises`
+#: of a method.
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
@@ -1667,7 +1677,7 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
     """Return the docstring of a method of `Robot`, completed with the shared arguments and errors.
 
-    The shape of the result, its units and its equations come from the table of quantities.
+    The dictionary `QUANTITIES` contains the shape, the units and the equations of the result.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)

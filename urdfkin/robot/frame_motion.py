@@ -34,7 +34,7 @@ class Check:
     Attributes:
         units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
             Here eps is the machine epsilon, and scale is the size of the quantity's numbers.
-        share: (n,) `units` divided by `bound`; a value above 1 is a failure.
+        share: (n,) the difference as a fraction of its bound; the check fails if a value is above 1.
         bound: (n,) largest difference that rounding can cause, divided by eps * scale.
     """
 
@@ -55,7 +55,7 @@ class FrameMotion:
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
         movable: (6, nv) False for entries of the Jacobian that are 0 in every configuration.
-        parts: The acceleration, split into the contributions of each joint and of each term of the equation.
+        parts: The contributions to the acceleration: for each joint, one for each term of the equation.
         checks: Comparison with Pinocchio for each quantity, by its name. Empty if Pinocchio cannot check the
             robot.
         not_verified: The reason why Pinocchio cannot check the robot; None if it can.

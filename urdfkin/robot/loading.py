@@ -266,7 +266,7 @@ def _load_usd(
 
 
 def _is_plain(robot: Robot) -> bool:
-    """Return whether no root joint was added, no joint was locked, and every mimic joint kept its rule."""
+    """Return whether the robot has no added root joint, no locked joint and all of its mimic rules."""
     origin = robot.origin
     return origin.mimic is not False and origin.root_joint is None and not origin.lock
 
@@ -332,7 +332,7 @@ def robot_of(
         joints: As in `load`.
         listed: Findings about the original source, if the text was generated from another format.
         made: Whether the text was generated, so that no file contains it.
-        table: Whether the original source is a table.
+        table: Whether the robot was given as a Denavit-Hartenberg table or a product of exponentials.
         quiet: Whether to issue no warnings.
 
     Raises:

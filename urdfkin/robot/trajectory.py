@@ -3,15 +3,15 @@
 A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. The motion starts and ends at
 rest, and the acceleration is continuous. If a file has no joint velocities, they are computed by central
 differences of the configurations, after the angles are unwrapped. The error of these joint velocities is
-proportional to the square of the time step. Joint accelerations that are computed from configurations have a
-larger error at the start and the end of the trajectory: this error is proportional to the time step. To
-estimate the errors, the differences are also computed from every second sample, and the two results are
+proportional to the square of the time step. If joint accelerations are computed from configurations, their
+errors at the start and the end of the trajectory are larger. These errors are proportional to the time step.
+To estimate the errors, the differences are also computed from every second sample, and the two results are
 compared.
 
-A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. The jump from one end of this range to the
-other is not a motion. A difference across this jump would, however, give a huge joint velocity. The angle of
-a planar joint wraps in the same way. The quaternion of a floating joint may change its sign without a change
-of orientation.
+A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. If the wheel passes the end of this range,
+the angle in the log jumps. A velocity that is computed from this jump would be huge and wrong. The angle of a
+planar joint wraps in the same way. The quaternion of a floating joint may change its sign without a change of
+orientation.
 """
 
 from __future__ import annotations
@@ -131,14 +131,14 @@ _TIME_ROUNDING = 1e-6
 class Samples:
     """The n samples in a file, converted to urdfkin's convention.
 
-    An attribute is None if the file does not contain its numbers.
+    For example, the attribute `v` is None if the file contains no joint velocities.
 
     Attributes:
         where: Name of the file.
         q: (n, nq) configurations, as they are in the file.
         t: (n,) seconds, increasing.
         v: (n, nv) joint velocities.
-        a: (n, nv) joint accelerations. They are present only together with v.
+        a: (n, nv) joint accelerations. The array is None if `v` is None.
         base: Motion of the root link for all n samples.
     """
 
@@ -211,7 +211,7 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
         robot: The robot.
         start: (nq,) rad, m.
         end: (nq,) rad, m. A continuous joint moves by `end - start`, also if this is more than one turn.
-            Planar and floating joints make no whole turn.
+            Planar and floating joints turn by at most half a turn.
         duration: Seconds.
         samples: Number of samples, including both ends.
 
@@ -241,7 +241,8 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # In a screw motion, the velocity and the acceleration in the moving frame are s' and s'' times `step`.
+    # The joint velocities are `step` times s', and the joint accelerations are `step` times s''. The same is
+    # true for screw motions, because their velocities are expressed in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -339,8 +340,8 @@ def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
     if n >= 2 * _FEWEST - 1:
         half = slice(None, None, 2)
         coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # With half of the samples, the time step doubles.
-        # An error of first order then doubles, and an error of second order is four times as large.
+        # With half of the samples, the time step doubles. Then an error that is proportional to the time step
+        # doubles. An error that is proportional to the square of the time step is four times as large.
         order = 1 if x.v is None else 2
         errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -400,7 +401,11 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return the unit of each number of "q", "v" or "a" by the number's name: "rad", "m/s", ... or ""."""
+    """Return a dictionary from the names of coordinates or joint velocities to units such as "rad" or "m/s".
+
+    The argument `letter` selects coordinates ("q"), joint velocities ("v") or joint accelerations ("a"). The
+    unit of a quaternion's component is "".
+    """
     layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -527,7 +532,8 @@ _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: Patterns of a unit at the end of a heading, as in `v:elbow_deg_s`, `a:elbow_rad_per_s2` and `elbow_deg`.
+#: Regular expressions for CSV column names that end with a unit, for example `v:elbow_deg_s`,
+#: `a:elbow_rad_per_s2` and `elbow_deg`.
 _SUFFIXES = (
     re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
     re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
@@ -662,11 +668,11 @@ def _check_columns(
         )
 
 
-#: If the angles of a column were wrapped to one turn, they differ by at most this value (rad). It includes a
-#: margin for angles that are rounded to two decimals.
+#: If angles were wrapped to one turn, the largest and the smallest angle differ by at most this value (rad).
+#: It includes a margin for angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: If the angle (rad) between two samples exceeds this value, the direction of the rotation is ambiguous. The
-#: rotation in the other direction is then less than twice as large.
+#: If a joint turns by more than this angle (rad) between two samples, the direction of its rotation is
+#: uncertain. In the opposite direction, the joint would turn by less than twice this angle.
 _AMBIGUOUS = math.tau / 3.0
 
 #: A smaller motion (radians or metres) of a mimic joint counts as rounding.
@@ -680,7 +686,7 @@ class Unwrapped:
 
     Attributes:
         q: (n, nq) configurations.
-        joints: Names of the joints with changed coordinates.
+        joints: Names of the joints whose coordinates were changed by unwrapping.
         notes: Remarks for the user, one line each.
     """
 
@@ -773,7 +779,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Unwrapping adds whole turns to a joint's angle. Yield a note for each mimic joint that this changes."""
+    """Yield a note for each mimic joint that moves if whole turns are added to its mimicked joint."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):

@@ -69,7 +69,7 @@ def _view(elevation: float, azimuth: float) -> FloatArray:
 
 @dataclass
 class _Canvas:
-    """A picture that projects points in space; labels are collected and written last.
+    """A two-dimensional drawing of points in space; its labels are drawn last.
 
     Attributes:
         axes: Matplotlib's axes.
@@ -111,7 +111,8 @@ class _Canvas:
     def write_labels(self) -> None:
         """Draw the labels.
 
-        Labels of the same colour at the same place are merged; other overlapping labels are moved apart.
+        Two labels of the same colour at the same point become one label. Other labels are moved so that they
+        do not overlap.
         """
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for place, along, text, color in self.labels:
@@ -137,7 +138,7 @@ class _Canvas:
 
 
 def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
-    """Return (n, 3): for each row, the point where the segment of d meets the segment of a."""
+    """Return for each row of the table the point (n, 3) between the offset d and the length a."""
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
         # in this convention, the offset d comes first, then the length a

@@ -37,7 +37,7 @@ TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
 #: Okabe and Ito's colours, distinguishable with every colour vision deficiency. Some readers see no colours.
-#: Therefore each difference in colour is also a difference in sign, line style or position.
+#: Therefore lines with different colours also differ in line style, sign or position.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
@@ -73,7 +73,10 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def style(**more: Any) -> Any:
-    """Return a matplotlib context in which text stays text and equal drawings give equal files."""
+    """Return a matplotlib context.
+
+    In SVG files of this context, text is stored as text, and equal drawings give equal files.
+    """
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 
@@ -144,7 +147,7 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
 
 
 def _with_ids(text: str, prefix: str) -> str:
-    """Keep only ids that are referred to, and add the prefix to them."""
+    """Remove unused ids from an SVG text, and add the prefix to all other ids."""
     used = set(re.findall(r"url\(#([^)]+)\)", text)) | set(re.findall(r'href="#([^"]+)"', text))
     text = re.sub(
         r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", text

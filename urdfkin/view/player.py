@@ -73,7 +73,7 @@ class Player:
         save.on_click(lambda event: self._save(event.client))
 
     def check(self) -> None:
-        """Check the chosen frame along the whole trajectory, and write the result."""
+        """Compare the chosen frame's motion with Pinocchio for all samples, and show the result."""
         viewer, x = self._viewer, self.trajectory
         motion = frame_motion(viewer.robot, x, viewer.frame.value, viewer.reference.value)
         mark = "! " if motion.not_verified is not None else "✓ " if motion.agrees else "✗ "

@@ -168,7 +168,7 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: Text that follows the unit of a joint coordinate: nothing for q, "/s" for v, "/s²" for a.
+#: The text "rad" or "m" is followed by "/s" for joint velocities and by "/s²" for joint accelerations.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
 #: Names of the panels of coordinates. Each panel has one plot for each unit.
 COORDINATES = tuple(_PER)
@@ -232,7 +232,7 @@ def _coordinates(
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
     """Return whether each sample is outside the limits by more than one unit in the last place of a double.
 
-    A smaller deviation may come from the decimal notation of the limits, so it does not count.
+    A smaller deviation is ignored, because it may come from the decimal notation of the limits.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -249,10 +249,10 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 _PAGE = (7.6, 10.4)
 #: Height of a panel, and of title and footer together, in inches.
 _HEIGHT, _WORDS = 2.1, 0.9
-#: Three numbers for the layout of text: letters per inch in the footer, letters per inch in a legend, and the
-#: width of a legend's line marker in letters.
+#: Numbers for the layout of text: letters per inch in the footer and in a legend. The sample line in a legend
+#: is as wide as `_HANDLE` letters.
 _LETTERS, _LETTERS_OF_LEGEND, _HANDLE = 16, 22, 8
-#: Sentence for the footer of a figure if v and a were not computed exactly from q.
+#: This sentence is in the footer of a figure if v and a may not be the exact derivatives of q.
 _RATES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
 )

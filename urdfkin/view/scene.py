@@ -98,7 +98,8 @@ class Shape:
     Attributes:
         link: The link's name.
         kind: "box", "cylinder", "sphere" or "mesh".
-        size: Box: x, y, z; cylinder: radius, length; sphere: radius; mesh: scale x, y, z. Metres.
+        size: Lengths in metres: (x, y, z) for a box, (radius, length) for a cylinder, (radius,) for a sphere.
+            For a mesh, the scale factors (x, y, z).
         T_link_shape: (4, 4) pose of the shape in the link's frame.
         colour: Red, green, blue and opacity, each from 0 to 1. None means the colours of the mesh file.
         file: The mesh's file; None for other kinds, and for a file that is not found.

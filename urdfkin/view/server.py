@@ -12,11 +12,11 @@ Four independent measures keep them out:
 
 `RequestFilter` decides about requests; it does not depend on viser or a network.
 
-Viser checks neither the Host header nor the Origin header, and has no option to check them. Viser starts its
-web server by a call of `websockets.asyncio.server.serve`. This module replaces that function and answers the
-requests itself. Before a robot is shown, the module tests the running server with requests that it must
-refuse. It stops the server if the server accepts one of these requests. A new version of viser can therefore
-make the viewer fail, but it cannot make it insecure.
+Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
+server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that answers
+the requests. Before a robot is shown, the module tests the running server with requests that it must refuse.
+It stops the server if the server accepts one of these requests. A new version of viser can therefore make the
+viewer fail, but it cannot make it insecure.
 
 The address is not passed to the browser on its command line, which every user of the machine can read.
 Instead the browser opens a file in a private folder. This file redirects the browser to the address.
@@ -116,7 +116,7 @@ class RequestFilter:
         return None
 
     def _is_known(self, host: str) -> bool:
-        """Return whether a Host header may name this server.
+        """Return whether the Host header of a request names this machine: an IP address or an allowed name.
 
         An attacker can make a host name resolve to this machine. An IP address needs no name server, so it is
         safe. The port in the header is not checked, because it differs if the port is forwarded.
@@ -279,7 +279,7 @@ def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[
 
 
 def _page() -> Callable[[str], bytes]:
-    """Return a function that returns viser's page, a single file, with a given nonce."""
+    """Return a function that creates viser's page for a nonce, which is a random key of the page."""
     import viser  # noqa: PLC0415  an extra
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
@@ -291,7 +291,8 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD) != 1:
         raise UnguardedError("the page of viser has no <head> element")
-    # Our script comes first: it names the controls, follows the browser's theme, and runs before viser's.
+    # urdfkin's script is inserted before viser's script, and therefore runs first. It names the controls and
+    # follows the browser's theme.
     ours = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:
@@ -305,7 +306,10 @@ def _page() -> Callable[[str], bytes]:
 
 @contextlib.contextmanager
 def _responding_with(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """Inside this context, let new servers respond with `answer`, without a log of refused requests."""
+    """While the context is open, new servers call `answer` for each request.
+
+    They do not log refused requests.
+    """
     from websockets.asyncio import server as module  # noqa: PLC0415  with viser
 
     plain: Any = module.serve

@@ -134,8 +134,8 @@ def scalar_first(R: FloatArray) -> FloatArray:
 
 #: Maximum time (s) between the opening of a page and its final layout.
 _OPENING = 15.0
-#: Direction from the robot to the camera, fraction of the view that the robot fills, and viser's vertical
-#: field of view in rad.
+#: `_FROM` is the direction from the robot to the camera. The robot fills the fraction `_FILLED` of the view.
+#: `_FOV` is viser's vertical field of view in rad.
 _FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
 
 
@@ -158,7 +158,7 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
 
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
-#: Display modes of the shapes, and the kinds of names that can be shown beside the frames.
+#: `SHAPES` are the display modes of the shapes. `NAMES` are the names that can be shown beside frames.
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
@@ -217,7 +217,10 @@ class Stage:
         initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes. Return whether shapes are missing; then the skeleton is shown."""
+        """Add the shapes.
+
+        Return True if any shape is missing, or if there are none; the viewer then shows the skeleton.
+        """
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
@@ -414,14 +417,15 @@ class Stage:
 
 
 def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return three points for each row of the table, as three arrays (rows, 3).
+    """Return the points between which a Denavit-Hartenberg table is drawn, as three arrays (rows, 3).
 
-    A row is drawn as two segments, d and a. The points are the start of the first segment, the common point,
-    and the end of the second segment.
+    Each row of the table is drawn as two straight lines, which have the lengths d and a. The arrays contain
+    the starts of the first lines, the common points of both lines, and the ends of the second lines.
     """
     starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
     if str(table.convention) == "standard":
-        # d along the previous z axis, then a along the new x axis.
+        # In the standard convention, d comes first and lies on the previous z axis. The length a comes next
+        # and lies on the new x axis.
         a = np.array([row.a for row in table.rows]).reshape(-1, 1)
         return starts, ends - a * frames[1:, :3, 0], ends
     a = np.array([row.a for row in table.rows]).reshape(-1, 1)

@@ -1,7 +1,7 @@
 """The viewer: a panel with sliders and checked numbers beside the robot's picture.
 
-When the user moves a slider, it reports only its own number. When the program sets a value, the slider shows
-the value and reports nothing.
+When the user moves a slider, it reports only its own number. If the program sets a value, the slider shows
+this value but reports no change.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ from urdfkin.view.stage import (
 #: A joint with a larger range than this counts as unlimited, like a wheel.
 _FAR = 100.0
 #: A slider or an arrow key changes an angle by `_DEGREES` if the viewer shows degrees, and by `_RADIANS` if
-#: it shows radians. It changes a length by the length's range divided by `_STEPS`.
+#: it shows radians. For a number that is not an angle, the change is the slider's range divided by `_STEPS`,
+#: rounded down to 1, 2 or 5 times a power of ten.
 _DEGREES, _RADIANS, _STEPS = 1.0, 0.01, 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
 #: Default ranges: joint velocity in rad/s or m/s, and joint acceleration in rad/s^2 or m/s^2.
@@ -55,7 +56,7 @@ _MOST_MISSING = 5
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The number that one slider sets.
+    """Description of one slider, which sets one number of q, v or a.
 
     Attributes:
         at: Index in the vector.
@@ -72,14 +73,15 @@ class Row:
 
 
 class Sliders:
-    """The sliders of one folder of the panel; each `Row` has a slider.
+    """A group of sliders in the viewer's panel, for example for all joint velocities.
 
     Args:
         gui: Viser's GUI.
         folder: The folder of the sliders.
         rows: The numbers to show.
         rate: Text after the unit: "" for q, "/s" for v, "/s²" for a.
-        moved: Called with the index and the number when the user moves a slider.
+        moved: Function that is called when the user moves a slider; its arguments are the index and the new
+            number.
     """
 
     def __init__(
@@ -163,9 +165,9 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
 
 
 def coordinate_rows(robot: Robot) -> list[Row]:
-    """Return a row for each coordinate that can change, with the range of its joint's limits.
+    """Describe a slider for each coordinate that can change; the slider's range is the joint's limits.
 
-    The components of a quaternion have no row.
+    Quaternions have no sliders.
     """
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
@@ -184,7 +186,7 @@ def fixed_coordinates(robot: Robot) -> list[str]:
 
 
 def rate_rows(robot: Robot, *, second: bool) -> list[Row]:
-    """Return a row for each joint velocity or, if `second` is true, for each joint acceleration."""
+    """Describe a slider for each joint velocity, or for each joint acceleration if `second` is true."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
         for k in range(joint.nv):
@@ -450,7 +452,7 @@ class Viewer:
         """Move the robot and all sliders to a configuration.
 
         Raises:
-            InputError: `q` is invalid, as in every function with a `q`.
+            InputError: `q` is not a valid configuration of the robot.
         """
         with self._lock:
             self.q = checked(self.robot.tree, q, "q").copy()

@@ -8,9 +8,8 @@ folder is writable, nothing is cached.
 
 Parts. A *part* is a function that only kernels call, never Python. The compiler inlines a part into each
 kernel that calls it. A part therefore needs no machine code of its own, and no optimization before it is
-inlined. The source code of parts uses only some features of Python. Compiler passes for other features are
-skipped, for example the passes for closures and for array expressions. Skipping all these steps halves the
-compile time.
+inlined. Parts use no closures and no array expressions. The compiler passes for such unused features of
+Python are therefore skipped. Skipping all these steps halves the compile time.
 """
 
 from __future__ import annotations
@@ -49,8 +48,8 @@ class KernelCache(_Null):  # type: ignore[misc]
     """The disk cache of one function. Numba reads the cache before a compilation and writes it afterwards.
 
     The folder's name contains a digest of the source files that all kernels share. A file's name depends on
-    the function, on its own source file (which may be in another package), on its argument types and on the
-    processor. The function `missed` is called if the cache has no usable file.
+    the function, its source file, its argument types and the processor. The source file may be in another
+    package. The function `missed` is called if the cache has no usable file.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, missed: Callable[[], None]) -> None:
@@ -94,10 +93,7 @@ _register: Any = register_pass
 
 
 class _Part(_Library):  # type: ignore[misc]
-    """The LLVM code of a part.
-
-    The code of a part is linked into a kernel, with the code of all functions that the part calls.
-    """
+    """The LLVM code of a part, that is, of a function that only kernels call."""
 
     def finalize(self) -> None:
         """Mark the library as finished without generating machine code."""
@@ -155,12 +151,10 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time
 
-#: Options of every compiled function.
-#: The compiler must not reorder operations.
-#: The compiler fuses a product and a sum only where the module `numbers` requests it.
-#: Results therefore do not depend on the compiler.
-#: Division by zero gives inf as in C, so that loops contain no branch that raises an error.
-#: The functions allocate no memory, so their arrays need no reference counts.
+#: Options of every compiled function. The compiler must not reorder operations. The compiler fuses a product
+#: and a sum only where the module `numbers` requests it. Results therefore do not depend on the compiler.
+#: Division by zero gives inf, as in C. Loops therefore contain no branch that raises an error. The functions
+#: allocate no memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 #: Options of a part. Because a part is only inlined into kernels, it has no entry point for Python or C.
 _PART: dict[str, Any] = {
@@ -184,8 +178,8 @@ def compiling_allowed() -> Iterator[None]:
 def _skip_blas_check() -> None:
     """Prevent Numba from importing SciPy's linear algebra for a check.
 
-    The import takes a fifth of the running time of a command. No kernel calls linear algebra. Numba still
-    imports and checks SciPy's linear algebra for other compiled functions that call it. If a version of Numba
+    The import takes a fifth of the running time of a command. No kernel calls linear algebra. For other
+    compiled functions that call linear algebra, Numba still imports and checks SciPy. If a version of Numba
     makes this check in a different function, `_skip_blas_check` has no effect.
     """
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
@@ -200,7 +194,7 @@ def _skip_blas_check() -> None:
 
 
 def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return Numba's decorator for compiled functions, with this package's options and the given options."""
+    """Return Numba's decorator for compiled functions; `options` are added to this package's options."""
 
     def decorate(function: Callable[..., Any]) -> Any:
         with compiling_allowed():
@@ -238,9 +232,9 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # Python calls this for attributes that do not exist yet.
-        # Before Python 3.12, a cached property has its own lock.
-        # That lock could stay locked forever in a forked child process, so this is no cached property.
+        # Python calls this for attributes that do not exist yet. Before Python 3.12, a cached property has
+        # its own lock. In a forked child process, that lock could stay locked forever. Therefore `compiled`
+        # is not a cached property.
         if name != "compiled":
             raise AttributeError(name)
         with compiling:
@@ -295,7 +289,7 @@ class Core(Kernel):
 
 
 def core(function: Callable[..., int]) -> Core:
-    """Return the compiled form of a function whose arguments are addresses and other integers.
+    """Return a compiled version of a function whose arguments are integers, for example memory addresses.
 
     The function is compiled at the first call and cached on disk.
     """

@@ -3,9 +3,9 @@
 Scratch memory consists of *rows* of `LANES` doubles, one double for each configuration of a block.
 
 In an array, all numbers of one configuration are adjacent. In scratch memory, a row contains one quantity for
-all eight configurations. The transfer is therefore a transposition. Transposing one number at a time would
-take a third of the time that the computation of a Jacobian takes. Transposing a block of eight by eight
-numbers takes only a few shuffle instructions. If the number of values is not a multiple of eight, the
+all eight configurations. The transfer is therefore a transposition. If the numbers were moved one at a time,
+the transposition would take a third of the time of computing a Jacobian. Transposing a block of eight by
+eight numbers takes only a few shuffle instructions. If the number of values is not a multiple of eight, the
 remaining values are transferred in blocks of four, two and one.
 """
 
@@ -46,9 +46,9 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the eight doubles of a row of scratch memory, or `nothing()` if `wanted` is `nothing()`.
+    """Return the eight doubles of a row of scratch memory; return `nothing()` if they are not needed.
 
-    The object `nothing()` of the module `numbers` stands for a number that is not needed.
+    The caller passes `nothing()` as the argument `wanted` if the row is not needed.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -89,7 +89,7 @@ def constant(context: Any, g: Any, i: Any) -> Any:
 
 @intrinsic
 def same(context: Any, x: Any) -> Any:
-    """Return the double x as a number with the same value for all configurations."""
+    """Return a vector in which the double x is repeated for all eight configurations."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, arguments[0], LANES)
@@ -101,7 +101,7 @@ def same(context: Any, x: Any) -> Any:
 def numbers_of(context: Any, array: Any) -> Any:
     """Return a pointer to an array's numbers.
 
-    Unlike the array, the pointer does not test for negative indices.
+    An index into a pointer must not be negative, so compiled code need not test the sign of the index.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -121,12 +121,12 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: The first function returns a pointer to the doubles at an address.
-#: The second function returns a pointer to the integers at an address.
+#: `numbers_at` converts an address to a pointer to doubles. `whole_numbers_at` converts an address to a
+#: pointer to integers.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Largest number of doubles that are prefetched. They fill half of a processor's first-level cache.
+#: Largest number of doubles that are prefetched. These doubles fill half of a processor's first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 
@@ -149,9 +149,9 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
     """Transpose each square block of numbers in the matrix whose rows are the given vectors.
 
-    For example, four vectors of eight numbers contain two blocks of 4 by 4 numbers. The function has one step
-    for each w = 1, 2 and 4 that is below the number of vectors. In each block of 2w by 2w numbers, the step
-    exchanges the upper right and the lower left block of w by w numbers.
+    For example, four vectors of eight numbers contain two blocks of 4 by 4 numbers. The function transposes
+    blocks of 2 by 2 numbers first, then, for enough vectors, blocks of 4 by 4 and of 8 by 8. To transpose a
+    larger block, it exchanges the block's upper right quarter with the lower left quarter.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -198,9 +198,9 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Return a function that writes `width` scratch rows to an array, for eight configurations.
+    """Return a function that copies `width` rows of scratch memory to an array.
 
-    The rows may have any indices.
+    The rows need not be adjacent. The array has the numbers of eight configurations.
     """
 
     @intrinsic
@@ -258,7 +258,7 @@ def read_rows(m, x, at, stride, count, s, row):
 def write_rows(m, s, rows, first, count, to, at, stride):
     """Write `count` rows of scratch memory to the array `to`, from `to[at]` on.
 
-    The list `rows` has the indices of the rows, from `rows[first]` on. If `m` is 1, only one
+    The indices of these rows are `rows[first]`, `rows[first + 1]` and so on. If `m` is 1, only one
     configuration is written, else eight.
     """
     i = 0
@@ -299,7 +299,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 def fetch(x, at, count):
     """Load `count` numbers from `x[at]` on into the cache.
 
-    The numbers are the inputs of the next block, which are loaded while this block is computed.
+    While one block of configurations is computed, this function loads the inputs of the next block.
     """
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
@@ -332,7 +332,8 @@ def _plus_squares(total, x, at):
 def add_squares(total, x, at, count):
     """Add the squares of `count` numbers from `x[at]` on to `total`, and load later numbers into the cache.
 
-    Each of the last `count % 8` numbers is added in every lane, that is, eight times.
+    The function adds eight numbers at once. If `count` is not a multiple of eight, each remaining number is
+    added eight times.
     """
     # Four independent sums take a quarter of the time of one sum.
     second, third, fourth = same(0.0), same(0.0), same(0.0)
@@ -385,10 +386,10 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 
 @compiled
 def stream(x, count, to, at, address):
-    """Copy `count` numbers to the array `to`, from `to[at]` on, without writing them to the caches.
+    """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
-    Before it writes a part of a cache line, a processor reads this line. A processor does not read a cache
-    line that is written as a whole. `address` is the address of `to[0]`.
+    Before it writes a part of a cache line, a processor reads this line. If all bytes of a cache line are
+    written at once, the processor does not read the line first. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

@@ -2,13 +2,14 @@
 
 A value of type `Lanes(8)` is eight doubles in one vector register. A value of type `Lanes(1)` is one double.
 `Lanes(8)` and `Lanes(1)` are Numba types that use LLVM's vectors, so a value stays in a register from one
-equation to the next. A product is kept as its two factors until it is added. The sum x y + z is then one
-fused multiply-add, which is rounded once. This module, and not the compiler, decides which operations are
-fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every machine.
+equation to the next. A product x y is not computed at once. In the sum x y + z, the product and the sum are
+one fused multiply-add, which is rounded only once. This module, and not the compiler, decides which
+operations are fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every
+machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
-sum with zero, costs no time. If z = (0, 0, 1) is written with these numbers, the equations for any axis
-simplify to the equations for the axis z. `nothing()` stands for a number that is not needed. A result
+sum with zero, costs no time. If the axis is `(zero(), zero(), one())`, the compiler therefore simplifies the
+equations for any axis to those for the z axis. `nothing()` stands for a number that is not needed. A result
 computed from `nothing()` is also `nothing()` and costs no time.
 """
 
@@ -44,7 +45,7 @@ class Lanes(types.Type):
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return this type if `other` is a `Product` of the same width, else None."""
+        """Return this type if the type `other` is a `Product` with the same number of doubles, else None."""
         return self if isinstance(other, Product) and other.width == self.width else None
 
 
@@ -143,7 +144,10 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether each type is a type of this module or an integer, such as the 2 in 2 w x u."""
+    """Return whether each type is one of this module's number types or an integer type.
+
+    Equations contain integers as factors, for example the 2 in 2 (w x u).
+    """
     ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
@@ -312,7 +316,7 @@ zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
 
 @intrinsic
 def rounded(context: Any, x: Any) -> Any:
-    """Multiply the factors of a product and round the result, so that no later sum is fused with it.
+    """Multiply the factors of a product and round the result. A later sum is then rounded separately.
 
     Return other numbers unchanged.
     """

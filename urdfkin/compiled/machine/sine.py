@@ -1,12 +1,12 @@
 """Sine and cosine of several angles at once, to 0.65 units in the last place.
 
-The angle is reduced to [-pi/4, pi/4] by Cody and Waite's method. The rounding error of the reduction is
-computed too. The polynomials come from fdlibm (Sun Microsystems, k_sin.c and k_cos.c). For angles below 2^20
-quarter turns, pi/2 is represented by the sum of two doubles. Two doubles are enough because the reduction
-uses fused multiply-adds. Near a multiple of pi/2, the sine or the cosine is near 0, and this small value has
-an error of up to 1e-27. The sine and the cosine of a larger angle are computed by the C library. Smaller
-angles in the same vector do not use the C library, because the result of a configuration must not depend on
-the other configurations.
+Cody and Waite's method subtracts a multiple of pi/2 from the angle, so that the rest is in [-pi/4, pi/4]. The
+rounding error of this subtraction is computed too. The polynomials come from fdlibm (Sun Microsystems,
+k_sin.c and k_cos.c). For angles below 2^20 quarter turns, pi/2 is represented by the sum of two doubles. Two
+doubles are enough because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the
+cosine is near 0, and this small value has an error of up to 1e-27. The sine and the cosine of a larger angle
+are computed by the C library. Smaller angles in the same vector do not use the C library, because the result
+of a configuration must not depend on the other configurations.
 """
 
 from __future__ import annotations
@@ -70,13 +70,14 @@ def _of_small(context: Any, x: Any) -> Any:
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
         # This difference is exact, because the two terms are multiples of 2^-53 and differ by less than 1.
-        # The rounding error of r is `lost`, and the rounding error of z is `z_lost`.
+        # The variable `lost` is the rounding error of r, and `z_lost` is the rounding error of z = r^2.
         near = fused(builder, n, all_lanes(-PI_2), x)
         r = fused(builder, n, all_lanes(-PI_2_REST), near)
         lost = fused(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_lost = fused(builder, r, r, builder.fneg(z))
-        # `most` is 1 - z/2, and `most_lost` is its rounding error.
+        # The variable `most` is 1 - z/2, the beginning of the cosine's series. Its rounding error is
+        # `most_lost`.
         most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
         most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
         # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r.

@@ -2,13 +2,13 @@
 
 A call through Numba checks the type of each argument and unpacks every array, which takes as long as the
 recursion itself. CPython calls a built-in function without these checks: it passes the addresses of the
-arguments. The compiled function of this module is such a built-in function. It reads only a few 8-byte words
-of each array object, at the offsets that CPython and NumPy guarantee to C code. The function holds Python's
-global interpreter lock for about a microsecond. For arguments that it does not support, the function returns
-None.
+arguments. This module therefore compiles a function that CPython calls as a built-in function. The function
+reads only a few 8-byte words of each array object, at the offsets that CPython and NumPy guarantee to C code.
+The function holds Python's global interpreter lock for about a microsecond. For arguments that it does not
+support, the function returns None.
 
-A call marks its scratch memory as busy in one atomic operation, which is also safe in a Python without a
-global interpreter lock. If another thread is using the scratch memory, the function also returns None. The
+A call marks its scratch memory as busy. This is one atomic operation, so it is also safe in a Python without
+a global interpreter lock. If another thread is using the scratch memory, the function also returns None. The
 caller then computes the result in another way.
 """
 
@@ -43,7 +43,8 @@ _AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelA
 
 #: Number of words (of eight bytes) in the header of a Python object.
 _OWN = object.__basicsize__ // 8
-#: Index of the 8-byte word with an object's type, and index of the word with a tuple's first item.
+#: Positions of 8-byte words in memory: the word with the type of an object, and the word with the first item
+#: of a tuple.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words in a NumPy array (the C structure PyArrayObject_fields). The number of axes and the
 #: flags are numbers of four bytes.
@@ -51,7 +52,8 @@ _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN +
 #: In the C structure PyArray_Descr (an element type), one word has the byte order and the type number.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
-#: Required flags of an input array (C-contiguous and aligned), and of an output array (also writable).
+#: NumPy's flags for the arrays: an input array is C-contiguous and aligned. An output array must also be
+#: writable.
 _READABLE, _WRITABLE = 0x101, 0x501
 
 _incref = types.ExternalFunction("Py_IncRef", types.void(types.int64))
@@ -121,8 +123,9 @@ def one_configuration(bound, arguments, count):
     thread is using the scratch memory.
 
     Args:
-        bound: Address of a tuple. Its items are the kernel arguments, the array type, None, the function
-            that creates the result array, the array's shape, and objects that must stay alive.
+        bound: Address of a tuple of Python objects. The first item is the array of kernel arguments. The next
+            items are NumPy's array type, None, and the function that creates the result array. Then follow
+            the shape of the result array and objects that must stay alive.
         arguments: Address of the Python call's arguments.
         count: Number of these arguments.
     """
@@ -195,7 +198,7 @@ def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArr
 
 @cache
 def arrays_are_known() -> bool:
-    """Return whether this NumPy stores arrays in memory as this module expects.
+    """Return whether the installed NumPy has the memory layout of arrays that this module uses.
 
     If the result is False, the fast function `single` must not be used.
     """
@@ -212,9 +215,9 @@ def arrays_are_known() -> bool:
     )
 
 
-#: For each quantity: its kernel, and its kernel for the reference frame LOCAL.
-#: The third value is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a.
-#: The fourth value is the number of the result's axes that have length nv.
+#: For each quantity: its kernel, and its kernel for the reference frame LOCAL. The third value is the number
+#: of inputs: 1 for q, 2 for q and v, 3 for q, v and a. The fourth value is 0 for a result without an axis of
+#: length nv, 1 for a Jacobian (6, nv), and 2 for a Hessian (6, nv, nv).
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -227,14 +230,16 @@ _HOW: dict[str, tuple[Core, Core, int, int]] = {
 def single(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that computes a quantity of a compiled tree's only frame for one configuration.
+    """Return a fast function that computes a quantity of one frame for one configuration.
 
-    The base must be fixed. The function is compiled or read from disk.
+    The compiled tree must have only one frame, and the base must be fixed. The function is compiled or read
+    from disk.
 
     Returns:
-        The function and its kernel arguments. The function takes (q, ..., out or None). It returns the
-        result, or None if it does not support the arguments. The kernel arguments also contain the number of
-        results so far.
+        The function and its kernel arguments. The arguments of the function are q, then v and a if the
+        quantity needs them, and then the output array or None. The function returns the result, or None if it
+        does not support the arguments. The array of kernel arguments also contains a counter of the results
+        that the function has computed.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
