@@ -36,7 +36,7 @@ def lazy_import(home: str) -> Callable[..., Any]:
 def is_a(x: object, home: str) -> bool:
     """Return whether an object is an instance of the class `module:name`, without importing the module."""
     module, _, name = home.partition(":")
-    # There is no instance of a class whose module is not imported yet.
+    # If the module is not imported yet, no object can be an instance of its class.
     return isinstance(x, getattr(sys.modules.get(module), name, ()))
 
 
