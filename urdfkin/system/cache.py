@@ -1,9 +1,9 @@
 """Store results in a cache on disk, with a checksum in each file.
 
-The name of a cache folder contains a digest of the source files, so a changed source file has a new folder.
-urdfkin later executes or unpickles cached files. A file of another user could therefore run any code. For
-this reason, this module uses a folder only if no other user can write to it. A folder that urdfkin has not
-used for a month is deleted.
+The name of a cache folder contains a digest of the source files, so urdfkin uses another folder after a
+source file changes. urdfkin later executes or unpickles cached files. A file of another user could therefore
+run any code. For this reason, this module uses a folder only if no other user can write to it. A folder that
+urdfkin has not used for a month is deleted.
 
 `put` writes a file with a checksum, and `get` verifies it. A truncated or corrupted file could crash the
 process or compute a wrong result, so it is reported and replaced. The checksum includes the name of the file
