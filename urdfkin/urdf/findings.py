@@ -635,8 +635,8 @@ class Reporter:
         """Return the findings by line.
 
         Args:
-            fold: Whether to combine many warnings of one kind into one finding. From the hundredth error of
-                one kind on, the errors are always combined.
+            fold: Whether to combine many warnings with one code into one finding. With True, if there are
+                more than a hundred errors with one code, the hundredth error lists the lines of the others.
             wanted: A function that returns whether to report a finding. It is called once for each finding,
                 in file order. None: all findings are reported.
         """

@@ -1080,8 +1080,7 @@ class _Reader:
     def _joints(
         self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
-        """Yield the joint with its two links; also a fixed joint if the child's frame is not on the joint
-        axis."""
+        """Yield the joint with its two links, and a fixed joint if the child frame is not on the axis."""
         (A, B), (parent, child) = edge.frames, edge.ends
         axis = edge.axis
         shares = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
@@ -1236,8 +1235,7 @@ class _Reader:
             yield names[path], Mimic(names[leader_path], multiplier, offset)
 
     def _rules(self, edge: _Edge) -> Iterator[tuple[str, float, float]]:
-        """Yield each mimic rule of a joint as (path of the mimicked joint, multiplier, offset in rad or
-        m)."""
+        """Yield each mimic rule of a joint: (path of the mimicked joint, multiplier, offset in rad or m)."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
