@@ -177,7 +177,7 @@ class _Evaluation:
     GeneratorExp = ListComp
 
     def _rounds(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
-        """Yield an `_Evaluation` for each iteration of nested loops, with the values of the loop variables."""
+        """Yield an `_Evaluation` with the loop variables for each iteration of nested loops."""
         if not loops:
             yield self
             return

@@ -82,7 +82,7 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
     """Return the bytes without a byte order mark if they are UTF-8; None after an error.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         data: The bytes of the file.
     """
     if not data.strip():
@@ -494,7 +494,7 @@ class NumberReader:
     """Reader of numbers in attributes, which reports invalid numbers.
 
     Attributes:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         bad_number: The rule for an invalid number. The default rule is for numbers that kinematics uses.
         bad_vector: The rule for an attribute with too few or too many numbers.
     """

@@ -291,7 +291,7 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
     """Report each missing mesh file, and report once each package that is not found.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         root: The root element of the document.
         beside: The file of the URDF; None if the URDF is text. For text, urdfkin searches only for meshes
             with `package://`, in the search paths of the environment.

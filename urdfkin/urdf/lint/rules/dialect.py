@@ -470,7 +470,7 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
     """Report names that are reserved, easily confused, or troublesome for other programs.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         robot: The records of the robot.
         root_joint: Kind of the additional joint `root_joint` whose parent is a link `universe`; None if the
             robot gets no such joint.

@@ -388,7 +388,7 @@ def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
     """Report problems of mimic joints.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         robot: The records of the robot.
         enabled: Whether the mimic rules are used. False: every finding is a note.
     """
@@ -610,7 +610,7 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> No
     """Report legal values that are probably mistakes.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         robot: The records of the robot.
         sound: Whether the joints form a tree, so that lengths along chains are defined.
     """
