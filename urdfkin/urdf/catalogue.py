@@ -1,16 +1,16 @@
 """Find robots by name in the catalogue and in robot_descriptions, and find ROS packages without ROS.
 
 The catalogue has the robots of example-robot-data and urdfkin's own. robot_descriptions is a Python package
-that clones the repository of a robot into its own cache at the first use. Of the modules of
-robot_descriptions, urdfkin imports only those in the package's own list of descriptions.
+that clones the repository of a robot into its own cache at the first use. urdfkin imports a module of
+robot_descriptions only if the list `DESCRIPTIONS` of this package contains its name.
 
 The search for a package uses the first of these folders that exists:
 
 1. Each folder in `ROS_PACKAGE_PATH`, for example `src`. If `src` itself has the package's name, it is the
    package. Otherwise the search tries `src/name` and `src/*/name`.
 2. `AMENT_PREFIX_PATH`: `share/name` below an entry.
-3. The folders above the file: a folder called `name`, a folder whose `package.xml` states this name, or a
-   subfolder called `name`.
+3. Each folder above the file. If the folder or its `package.xml` has the package's name, the folder is the
+   package. Otherwise the search tries the subfolder `name`.
 """
 
 from __future__ import annotations

@@ -191,8 +191,8 @@ class _Evaluation:
 class _Scope(Mapping[str, Any]):
     """A lookup of names: first the names of a loop, then the names of the scope around the loop.
 
-    This class does not copy the outer scope, because a copy would read every name, and xacro evaluates a name
-    whenever it is read.
+    xacro evaluates a name when it is read. A copy of the outer scope would read every name, so this class
+    makes no copy.
     """
 
     def __init__(self, outer: Mapping[str, Any], own: Mapping[str, Any]) -> None:

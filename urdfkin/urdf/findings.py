@@ -59,7 +59,7 @@ class Excerpts:
     """Excerpts of one file: the line of a finding, with carets below the marked text.
 
     Args:
-        data: The bytes of the file after a byte order mark.
+        data: The bytes of the file without a byte order mark.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -147,9 +147,9 @@ def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
 class Severity(Enum):
     """The severity of a finding.
 
-    An error makes the file unusable: it has no meaning, or two readers would read two different robots. A
-    warning is about legal content that is almost certainly a mistake, or that some readers read differently.
-    A note is information.
+    A file with an error is unusable: it describes no robot, or different URDF readers would build different
+    robots from it. A warning is about legal content. This content is almost certainly a mistake, or some
+    readers interpret it differently. A note is information.
     """
 
     ERROR = "error"
@@ -177,7 +177,7 @@ class Finding:
         code: The stable code, for example `URDF502`.
         severity: Error, warning or note.
         message: The problem in one clause, without a full stop.
-        found: The quoted text from the file that is wrong, or None.
+        found: The wrong text in the file, in quotes, or None.
         remedy: The remedy, or None.
         file: The name of the file as given by the user, or `<text>`, `<stdin>`.
         line: Line, from 1.
@@ -554,7 +554,7 @@ class Reporter:
             found: The wrong text in the file, in quotes.
             remedy: The remedy.
             owner: The tag that the finding names. None: the tag of the link or joint that contains `at`. Set
-                it if `at` is a link or joint that is in the wrong place.
+                `owner` if `at` is a link or joint in the wrong place.
             severity: Severity of the finding; None: the severity of the rule.
             position: Line and column of the finding, if `at` is None.
             weight: If findings of one kind are combined, the finding with the greatest weight is reported.
@@ -612,7 +612,8 @@ class Reporter:
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
         """Return up to three known names similar to `word`.
 
-        This search is slow. Therefore, from call number `SEARCHES` + 1 on, the method returns an empty list.
+        This search is slow. Therefore, only the first `SEARCHES` calls search. Later calls return an empty
+        list.
         """
         self._searches += 1
         if self._searches > SEARCHES:
@@ -635,8 +636,9 @@ class Reporter:
         """Return the findings by line.
 
         Args:
-            fold: Whether to combine many warnings with one code into one finding. With True, if there are
-                more than a hundred errors with one code, the hundredth error lists the lines of the others.
+            fold: Whether to combine many warnings with one code into one finding. If `fold` is True and there
+                are more than a hundred errors with one code, the hundredth error lists the lines of the
+                others.
             wanted: A function that returns whether to report a finding. It is called once for each finding,
                 in file order. None: all findings are reported.
         """
@@ -769,7 +771,10 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings with one code and severity. Many findings become one, which lists all lines."""
+    """Return the findings with one code and severity.
+
+    If there are many, combine them into one finding that lists all lines.
+    """
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

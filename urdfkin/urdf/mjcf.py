@@ -83,8 +83,8 @@ class Mjcf:
         coordinates: For each moving joint, including mimic joints: its index in MuJoCo's qpos.
         rules: The equalities that the tree represents as mimic rules. The key is the index of the equality in
             MuJoCo's model. The value is the name of the mimic joint.
-        apart: Indices in MuJoCo's model of active equalities between joints that the tree cannot represent as
-            mimic rules.
+        apart: The active equalities between joints that the tree cannot represent as mimic rules, as indices
+            in MuJoCo's model.
         listed: The parts of the file that the kinematic tree does not represent, and probable mistakes.
         whole: Whether `model` contains the shapes and inertias of the file.
         aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.
@@ -174,7 +174,7 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """Yield the index in the model, the kind, and the index in qpos of each joint of a body."""
+        """For each joint of a body, yield its index in the model, its kind, and its index in qpos."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         first = int(m.body_jntadr[body])
@@ -182,10 +182,10 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Convert one number per body, `at_body` (n, bodies), to one number per frame (n, frames).
+        """Convert a quantity per body, `at_body` (n, bodies), to a quantity per frame (n, frames).
 
-        The frame of a body has the number of this body. The frame of a site has the number of its body, plus
-        the number of the site in `own`.
+        The frame of a body has the quantity of this body. The frame of a site has the quantity of its body,
+        plus the quantity of the site in `own`.
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -280,7 +280,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         source: A path or text; included files are read, too.
         name: The name of the source in messages.
         whole: True: MuJoCo compiles the unchanged file, with its meshes. False: urdfkin first removes the
-            shapes and the inertias, so that the file is readable without its mesh files.
+            shapes and the inertias, so that MuJoCo can compile the file without its mesh files.
 
     Raises:
         InputError: MuJoCo is not installed or does not accept the file, or the robot has a ball joint.
@@ -340,7 +340,7 @@ def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
 
 
 def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield the free bodies without moving descendants that MuJoCo aligns with their inertial frame."""
+    """Yield each free body that MuJoCo aligns with its inertial frame. It has no moving descendants."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
@@ -608,7 +608,7 @@ class _Reader:
 
 
 def _leads(rules: dict[str, Mimic], joint: str, to: str) -> bool:
-    """Return whether the chain of mimicked joints from one joint contains another joint."""
+    """Return whether `joint` mimics `to`, directly or through other mimic joints."""
     while joint in rules and joint != to:
         joint = rules[joint].leader
     return joint == to

@@ -577,7 +577,10 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Return whether a text is too long to be converted to numbers, which takes quadratic time."""
+        """Return whether a text is too long for a number, and report it.
+
+        Its conversion takes quadratic time.
+        """
         if len(written) <= most:
             return False
         self.report.add(

@@ -1,7 +1,7 @@
 """Plain data for the elements, links and joints of a URDF, which `urdf.parser` reads. Size limits of a URDF.
 
-In the records of links and joints, None marks a value that could not be read; a finding reports it. A value
-that the file omits has the default of the specification.
+If the parser cannot read a value of a link or joint, it reports a finding, and the value in the record is
+None. If the file omits a value, the record contains the default of the specification.
 """
 
 from __future__ import annotations

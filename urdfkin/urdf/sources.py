@@ -166,9 +166,9 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
 
     Args:
         source: One of the sources in the module docstring.
-        most: Size limit in bytes; for an open text file, in characters. At most one byte or character more is
-            read, which shows that a source is too long. Therefore even an infinite device, such as
-            `/dev/zero`, ends the reading.
+        most: Size limit in bytes; for an open text file, in characters. To detect a source that is too long,
+            the function reads at most one more byte or character. Therefore the function also stops at an
+            infinite device such as `/dev/zero`.
         xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:

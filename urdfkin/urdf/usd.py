@@ -56,12 +56,12 @@ _LAYERS = 1_000
 #: Largest number in single precision. A USD file contains this number or infinity if a joint has no limit.
 _LARGEST = float(np.finfo(np.float32).max)
 #: Rounding can make the axes of a frame appear not perpendicular. If the cosine between two axes is at most
-#: `_SHEAR` * u * n, the frame has no shear. Here, n is the number of prims on the path of the prim, and u is
-#: the largest relative error of rounding to single precision. If a file stores a rotation matrix, each entry
-#: has an error of u. The multiplication of two such matrices in single precision adds an error of 3 u to each
-#: entry. Therefore the scalar product of two columns has an error of at most 4 * 2 sqrt(3) u, which is below
-#: 14 u. If a file stores a quaternion, rounding changes the length of the quaternion by u, and the cosine
-#: between two axes by 4 u.
+#: `_SHEAR` * u * n, the frame has no shear. Here, n is the number of prims on the path to the prim of the
+#: frame, and u is the largest relative error of rounding to single precision. If a file stores a rotation
+#: matrix, each entry has an error of u. The multiplication of two such matrices in single precision adds an
+#: error of 3 u to each entry. Therefore the scalar product of two columns has an error of at most 4 * 2
+#: sqrt(3) u, which is below 14 u. If a file stores a quaternion, rounding changes the length of the
+#: quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
 #: Limits of a joint up to this number hold it at one value, whether they are degrees or radians.
 _SMALLEST_ANGLE = 0.01
@@ -123,7 +123,7 @@ class JointReading:
         p1: (3,) origin of the joint's frame in the second body, m.
         quat1: (4,) unit quaternion of the joint's frame in the second body, scalar last.
         limits: Lower and upper limit, rad or m.
-        size: `p0` and `p1` are sums of vectors. This is the sum of the lengths (m) of these vectors, for
+        size: `p0` and `p1` are sums of vectors. `size` is the sum of the lengths (m) of these vectors, for
             error bounds.
     """
 
@@ -155,7 +155,8 @@ class Usd:
         single: For each joint name: five numbers that describe the effect of rounding to single precision.
             Number 1: a bound (m) on the error of the joint origins. Number 2: a bound (rad) on the error of
             the joint orientations. Number 3: the sum of the lengths (m) of the vectors that these orientation
-            errors rotate. Number 4: a bound on the relative error of the joint value from its mimic rule.
+            errors rotate. Number 4: a bound on the relative error of the joint value if a mimic rule computes
+                it, otherwise 0.
             Number 5: the distance (m) between the joint frame and the frame of the child.
         joints: The numbers of each joint prim of the tree. The key is the path of the prim.
         stage: The stage.
@@ -548,7 +549,7 @@ class _Reader:
             prim = prim.GetParent()
 
     def _uneven(self, prim: Any) -> str | None:
-        """Return a text about the nearest ancestor of a prim that has a non-uniform scale, or None."""
+        """Return a text about the nearest ancestor with a non-uniform scale, or None."""
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -1262,7 +1263,7 @@ class _Reader:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
     def _ratio(self, edge: _Edge, leader: str) -> float:
-        """Return the unit factor of a multiplier, which is 1; report a rule between an angle and a length."""
+        """Return 1, the unit factor of a multiplier. Report a mimic rule between an angle and a length."""
         kinds = {edge.path: edge.kind for edge in self._edges}
         slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
         if len(slides) > 1:
@@ -1334,7 +1335,7 @@ class _Reader:
             )
 
     def _layers(self, paths: Sequence[str]) -> None:
-        """Report each layer of these prims whose unit or up axis differs from that of the stage."""
+        """Report each layer that describes one of the prims in another unit or up axis than the stage."""
         root = self.stage.GetRootLayer()
         known = {root, self.stage.GetSessionLayer()}
         above = {str(one) for path in paths for one in self.pxr.Sdf.Path(path).GetPrefixes()}
@@ -1347,7 +1348,10 @@ class _Reader:
                     self._layer(layer.pseudoRoot, name, prim)
 
     def _layer(self, root: Any, name: str, prim: Any) -> None:
-        """Compare a layer with the stage; `prim` is the first prim that it describes."""
+        """Compare the unit and the up axis of a layer with the stage.
+
+        `prim` is the first prim in the layer.
+        """
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))

@@ -132,8 +132,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
     Raises:
         SourceError: the file does not exist.
         UnknownNameError: the file does not declare an argument.
-        XacroError: xacrodoc is not installed, or xacro cannot expand the file. For example, the file reads a
-            file or starts a program that is not allowed, or needs too much memory or time.
+        XacroError: xacrodoc is not installed, or xacro cannot expand the file. For example, the xacro code
+            opens a forbidden file, starts a program, or needs too much memory or time.
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))

@@ -2,8 +2,8 @@
 
 Each module that defines rules is a topic. These modules are the parser and the modules in `lint.rules`. A
 TOML file in the same folder, with the same name as the module, contains the documentation of the topic's
-rules. The file is read on demand. Its entry for one rule is called a page. If `cure`, `others` or `question`
-is at the top of the file, it applies to each page that does not define it. The table `parts` defines texts
+rules. The file is read on demand. The documentation of one rule is called a page. If the top of the file
+defines `cure`, `others` or `question`, the pages without this entry use it. The table `parts` defines texts
 that replace `{name}` in examples. Such a text is a string, or a pair [text, times] for a repeated text, in
 which `{i}` is the index of the repetition. Line breaks in prose have no meaning.
 """

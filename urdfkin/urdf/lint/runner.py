@@ -54,9 +54,9 @@ def check(
             None: True, except for robots of the catalogue with invalid mimic rules.
         root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
         xacro_args: Arguments for a .xacro file, which is expanded first. Lines refer to the expanded text.
-        fold: Whether to combine many warnings with one code into a single warning that lists the lines. With
-            True, if there are more than a hundred errors with one code, the hundredth error lists the lines
-            of the others.
+        fold: Whether to combine many warnings with one code into a single warning that lists the lines. If
+            `fold` is True and there are more than a hundred errors with one code, the hundredth error lists
+            the lines of the others.
 
     Returns:
         The findings that no comment silences, as a list. Notebooks show this list as a table. The list is

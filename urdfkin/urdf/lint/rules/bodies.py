@@ -288,7 +288,7 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report each missing mesh file, and report once each package that is not found.
+    """Report each missing mesh file. If a package is not found, report it only once.
 
     Args:
         report: This object collects the findings.
