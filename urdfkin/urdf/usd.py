@@ -156,8 +156,7 @@ class Usd:
             Number 1: a bound (m) on the error of the joint origins. Number 2: a bound (rad) on the error of
             the joint orientations. Number 3: the sum of the lengths (m) of the vectors that these orientation
             errors rotate. Number 4: a bound on the relative error of the joint value if a mimic rule computes
-                it, otherwise 0.
-            Number 5: the distance (m) between the joint frame and the frame of the child.
+            it, otherwise 0. Number 5: the distance (m) between the joint frame and the frame of the child.
         joints: The numbers of each joint prim of the tree. The key is the path of the prim.
         stage: The stage.
         unit: metersPerUnit.
