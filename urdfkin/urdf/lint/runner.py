@@ -49,9 +49,9 @@ def check(
 
     Args:
         source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
-        limits: Limits on the size of the file.
-        mimic: Whether mimic joints follow their mimicked joints. False: problems with mimic joints are notes.
-            None: True, except for robots of the catalogue with invalid mimic rules.
+        limits: Limits on the size of the file, its elements, names and numbers.
+        mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
+            are notes. The default is True, except for robots of the catalogue with invalid mimic rules.
         root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
         xacro_args: Arguments for a .xacro file, which is expanded first. Lines refer to the expanded text.
         fold: Whether to combine many warnings with one code into a single warning that lists the lines. If
@@ -148,7 +148,7 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 
     Args:
         data: The bytes.
-        limits: Limits on the size of the file.
+        limits: Limits on the size of the file, its elements, names and numbers.
         fold: As for `check`.
 
     >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
@@ -165,7 +165,8 @@ def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = 
     Args:
         report: A reporter with the name, the bytes and the limits of the file. The function adds findings to
             it.
-        mimic: Whether mimic joints follow their mimicked joints. False: problems with mimic joints are notes.
+        mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
+            are notes.
         root_joint: `"floating"` or `"planar"` if the robot gets such a joint. The file must not contain the
             names of this additional joint and of its parent link.
 

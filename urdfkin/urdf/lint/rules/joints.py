@@ -721,7 +721,7 @@ def _as_pi(multiple: Fraction) -> str:
 def _metres(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
-    # Write two significant digits, without an exponent.
+    # Round the length to two significant digits; `:g` then writes it without an exponent.
     return f"{float(f'{length * factor:.1e}'):g} {unit}"
 
 
