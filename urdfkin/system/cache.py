@@ -1,12 +1,13 @@
-"""The cache on disk: one folder for each state of the sources, with a checksum in each file.
+"""Store results in a cache on disk, with a checksum in each file.
 
-urdfkin later executes or unpickles cached files. Therefore, this module uses a folder only if no other user
-can have written to it. Folders of older versions are deleted after a month without use.
+The name of a cache folder contains a digest of the source files, so urdfkin uses another folder after a
+source file changes. urdfkin later executes or unpickles cached files. A file of another user could therefore
+run any code. For this reason, this module uses a folder only if no other user can write to it. A folder that
+urdfkin has not used for a month is deleted.
 
 `put` writes a file with a checksum, and `get` verifies it. A truncated or corrupted file could crash the
-process or compute a wrong result, so it is reported and replaced. The checksum includes the names of the file
-and of its folder, which identify the sources. Therefore, `get` detects a renamed file, which could belong to
-another robot.
+process or compute a wrong result, so it is reported and replaced. The checksum includes the name of the file
+and the name of its folder. Therefore, `get` detects a renamed file, which could belong to another robot.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 
-#: Version of the checksum. The version is part of the digest in a folder's name, so each version of the
-#: checksum uses folders of its own.
+#: Version of the checksum. Each version of the checksum uses other folders, because the digest in a folder's
+#: name includes this version.
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
-#: User ids that may own the parent folders: 0 (root) and 65534. A container may show the root user of the
-#: host as 65534.
+#: User ids that may own the parent folders: 0 (root) and 65534. In a container, the root user of the host may
+#: have the id 65534.
 _TRUSTED = (0, 65534)
 
 
@@ -48,8 +49,10 @@ def kept_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | No
 
     Args:
         kind: Kind of the cached files. The folder's name begins with this word.
-        sources: Files that the cached files depend on. Their contents are part of the folder's digest.
-        texts: Other texts that the cached files depend on.
+        sources: Files from which the cached files are computed. The digest in the folder's name includes the
+            contents of these files.
+        texts: Texts that also determine the cached files, for example options. The digest in the folder's
+            name includes them.
         root: The parent folder; None for the user's cache folder.
 
     Returns:
@@ -115,7 +118,7 @@ def _is_private(group: int) -> bool:
 
 
 def _delete_unused(root: Path, kind: str) -> None:
-    """Delete folders of this kind and this user that have not been used for a month."""
+    """Delete the user's cache folders of one kind that urdfkin has not used for a month."""
     for mark in root.glob(f"{kind}-*/{_USED}"):
         with contextlib.suppress(OSError):
             found = mark.stat()
@@ -168,5 +171,5 @@ def _checksum(place: Path, data: bytes) -> bytes:
 
 
 def report_damaged(place: Path, reason: str) -> None:
-    """Warn that a cached file cannot be used. The caller computes and writes its content again."""
+    """Warn that a cached file is damaged. The caller must compute the content again and replace the file."""
     say_once(f"{place} is damaged and is computed again: {reason}")

@@ -1,7 +1,8 @@
 """Types of JSON documents, their common header, their schemas, and functions that read and write them.
 
-A `Layout` is a kind of document. Its type (a `TypedDict`) defines the entries; the JSON Schema is generated
-from it, and a document from a file is checked against it. `plain` turns results into documents.
+A `Layout` describes one kind of document, for example a certificate. A `TypedDict` defines the entries of the
+document. urdfkin generates the JSON Schema from this `TypedDict`, and checks documents from files against it.
+`plain` turns results into documents.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def says(text: str) -> Meta:
 
 
 def of_length(n: int) -> Meta:
-    """Return the constraint that a list has n entries."""
+    """Return the JSON Schema constraint "this list has exactly n entries"."""
     return Meta(min_length=n, max_length=n)
 
 
@@ -49,8 +50,8 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 class Header(TypedDict):
     """The first entries of every certificate and report.
 
-    These entries state the layout of the document, its verdict, and the versions and texts on which the
-    verdict depends.
+    These entries name the kind of document and the verdict. They also contain the package versions and the
+    robot texts on which the verdict depends.
     """
 
     schema: Annotated[str, says("Name and version of the layout of this document.")]
@@ -79,12 +80,12 @@ class Layout(Generic[_T]):
     """A kind of document.
 
     Attributes:
-        name: The value of the entry "schema" in the document, which has a name and a version.
+        name: The value of the entry "schema" in each document of this kind: a name, a slash and a version.
         type: The type of the document.
         verdicts: The possible verdicts; empty if the document has no header.
-        made_by: The command that writes such a document.
-        is_open: Whether a document may have entries that `type` does not define. A later version of urdfkin
-            may write such entries.
+        made_by: The urdfkin command that writes documents of this kind.
+        is_open: Whether a document may have entries that `type` does not define, for example entries of a
+            later version of urdfkin.
     """
 
     name: str
@@ -121,12 +122,12 @@ class Layout(Generic[_T]):
 
         Raises:
             SourceError: The file cannot be read.
-            InputError: The file is not JSON, or its content is refused by `checked`.
+            InputError: The file is not JSON, or `checked` refuses the content of the file.
         """
         return self.checked(read_json(path), str(path))
 
     def checked(self, data: object, where: str) -> _T:
-        """Return plain data as a document of this layout.
+        """Check the content of a JSON file, and return it as a document of this layout.
 
         Args:
             data: The content of the file.
@@ -177,7 +178,7 @@ class Layout(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Return the place and the name of an entry that a type does not define, or None."""
+    """Return the JSON path and the name of an entry that is only in `data`, not in `document`, or None."""
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
             return place, f"unknown entry {unknown[0]!r}"
@@ -190,7 +191,9 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Return a result as objects, lists and numbers, from which `typed` restores the result.
+    """Convert a result to dicts, lists, texts and numbers.
+
+    The function `typed` restores the result from them.
 
     Infinite numbers stay infinite.
     """
@@ -218,7 +221,10 @@ def plain(value: Any) -> Any:
 
 
 def read_json(path: Path) -> object:
-    """Read a JSON file. Raise SourceError if it cannot be read, and InputError if it is not JSON."""
+    """Read a JSON file.
+
+    Raise SourceError if the file cannot be read, and InputError if the content is not JSON.
+    """
     return parse_json(read_bytes(path, MOST_DATA, pipes=True), str(path))
 
 

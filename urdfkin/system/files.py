@@ -23,7 +23,7 @@ from urdfkin.errors import InputError, SourceError
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """A replacement of some bytes by `text`. The first byte is `start`; the byte `end` is not replaced.
+    """A replacement of the bytes `data[start:end]` by `text`.
 
     If `start` equals `end`, the edit is an insertion.
     """
@@ -68,7 +68,7 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
     """Return the content of a file.
 
     Args:
-        path: A regular file, or a link to one.
+        path: A regular file, or a symbolic link to a regular file.
         most: Largest size in bytes.
         pipes: Whether to read pipes and devices too. Use True only for a path that the user named.
 

@@ -18,12 +18,12 @@ from urdfkin.system.files import MOST, read_bytes
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """A version of a repository.
+    """The files of one commit of a git repository.
 
     Attributes:
         root: The repository's root folder; names are relative to it.
-        files: For each file name: the digest of the file's content in this version.
-        digests: The digests of all files of this version.
+        files: For each file name: git's digest of the file's content in this commit.
+        digests: The digests of all files of this commit, as a set.
         gone: Base names of the files that no longer exist in the working tree.
     """
 
@@ -37,7 +37,7 @@ class Version:
         return Path(os.path.relpath(path.resolve(), self.root)).as_posix()
 
     def holds(self, data: bytes) -> bool:
-        """Return whether this version has a file, under any name, with exactly this content."""
+        """Return whether any file of this commit has exactly this content."""
         blob = b"blob %d\0" % len(data) + data
         return any(
             hashlib.new(kind, blob, usedforsecurity=False).hexdigest() in self.digests

@@ -1,9 +1,10 @@
 """Lazy imports, versions of installed packages, and hooks.
 
-`lazy_import` imports a function's module at the first call, so `--help` does not load NumPy. `is_a` tests for
-a class in the same way. The version functions read the metadata of a package without importing it. `EXTRAS`
-names the package that each extra installs. A hook lets a lower package call a function of a higher one by
-name, without importing it; `urdfkin/__init__.py` registers the hooks.
+`lazy_import` imports a function's module at the first call, so `--help` does not load NumPy. `is_a` tests
+whether an object belongs to a class, without importing the module of the class. The version functions read
+the metadata of a package without importing it. `EXTRAS` names the package that each extra installs. A hook is
+a function with a name. A module can call it by this name without importing the module of the function.
+`urdfkin/__init__.py` registers the hooks.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def lazy_import(home: str) -> Callable[..., Any]:
 def is_a(x: object, home: str) -> bool:
     """Return whether an object is an instance of the class `module:name`, without importing the module."""
     module, _, name = home.partition(":")
-    # There is no instance of a class whose module is not imported yet.
+    # If the module is not imported yet, no object can be an instance of its class.
     return isinstance(x, getattr(sys.modules.get(module), name, ()))
 
 

@@ -10,7 +10,7 @@ import os
 import threading
 
 _locks: list[threading.RLock] = []
-#: The locks that a thread holds during its fork, by the thread's identifier.
+#: For each thread that is forking, by thread identifier: the locks that the thread acquired before the fork.
 _acquired: dict[int, list[threading.RLock]] = {}
 
 
@@ -18,11 +18,11 @@ def lock_over_forks() -> threading.RLock:
     """Return a lock that a child process never inherits in a locked state.
 
     A fork waits until the lock is free. After the fork, the lock is unlocked in the parent and in the child.
-    A fork acquires the locks in reverse order of their creation. A thread that needs two of them must acquire
-    them in the same order.
+    A fork acquires the locks in reverse order of their creation. A thread that needs two of these locks must
+    also acquire the newer lock first.
 
-    Use this function for locks of modules only. A lock of an object would stay registered after the object is
-    deleted, until the process ends.
+    Use this function only for locks that are module variables. This module never removes a lock from its
+    list, so a lock of a deleted object would stay in the list until the process ends.
     """
     importing.register()
     lock = threading.RLock()
@@ -38,7 +38,7 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # There are none if another thread registered this function during the fork.
+    # The list is empty if another thread registered this function while the fork was already running.
     for lock in reversed(_acquired.pop(threading.get_ident(), [])):
         lock.release()
 
@@ -49,9 +49,10 @@ class _ImportLock:
     Without this lock, another thread could fork a child during the import. The child would wait for ever for
     the end of that import.
 
-    `logging` has a lock that a fork acquires too. An imported module may need that lock. So a fork must
-    acquire this lock first. Python calls the functions that acquire locks in reverse order of their
-    registration. For this reason, the function of this module is registered after `logging` is imported.
+    A fork also acquires the lock of `logging`, which an imported module may need. To avoid a deadlock, a fork
+    must acquire the import lock before the lock of `logging`. Python calls the registered functions in
+    reverse order of their registration. For this reason, `register` imports `logging` first and then
+    registers `_before_fork`.
     """
 
     def __init__(self) -> None:
@@ -60,11 +61,11 @@ class _ImportLock:
 
     def register(self) -> None:
         """Let each later fork acquire the locks of this module."""
-        if self._registered:  # the body of a module may call this while another thread holds the lock
+        if self._registered:  # a module may call this during its import, while another thread holds the lock
             return
         with self._lock:
             if not self._registered:
-                import logging  # noqa: F401, PLC0415  at the start, a file in the current folder could replace it
+                import logging  # noqa: F401, PLC0415  import late: a file in the current folder could replace `logging`
 
                 os.register_at_fork(
                     before=_before_fork, after_in_parent=_after_fork, after_in_child=_after_fork

@@ -4,8 +4,8 @@ Child processes of urdfkin do not import from the current folder. urdfkin runs i
 robots, and `python -c` and `python -m` search the current folder first: a file `json.py` beside a robot would
 be run. Libraries also search the current folder for settings files.
 
-A fork copies all locks but only one thread, which is the thread that forks. A lock that another thread holds
-at that moment would stay locked in the child for ever. `urdfkin.system.locks.lock_over_forks` prevents this.
+A fork copies all locks, but only the thread that calls `fork`. If another thread holds a lock during the
+fork, this lock would stay locked in the child for ever. `urdfkin.system.locks.lock_over_forks` prevents this.
 
 `with_stack` runs a function on a thread with a large stack. Pinocchio and its parser traverse a robot
 recursively: a chain of about 3,000 links overflows a stack of 8 MiB, and a few hundred links overflow a
@@ -26,13 +26,15 @@ from urdfkin.system.locks import lock_over_forks
 
 #: Environment variables that a Python interpreter may need to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
-#: Settings that limit linear algebra to one thread. Each thread needs address space, and a confined process
-#: has little of it.
+#: Settings that limit linear algebra to one thread. Each thread needs address space, which is limited in a
+#: confined process.
 _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
-    """Return the command of a new interpreter. Its import path is the same, but without the current folder.
+    """Return a command that runs code in a new interpreter.
+
+    The new interpreter imports from the same folders, except the current folder.
 
     Args:
         code: Python code to run.
@@ -42,8 +44,9 @@ def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
 
 
 def _path() -> list[str]:
-    # An empty or relative entry means the current folder or a folder relative to it, and is left out. urdfkin
-    # may have been imported through such an entry, so the folder of urdfkin is added.
+    # Empty and relative entries refer to the current folder, so they are removed. If Python found urdfkin
+    # through a removed entry, the new interpreter would not find urdfkin. Therefore the folder of urdfkin is
+    # added.
     home = str(Path(__file__).resolve().parents[2])
     return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_scratch(entry)), home]
 
@@ -59,9 +62,9 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
     Args:
         command: The command, for example of `own_python`.
         request: Bytes for its standard input.
-        patience: Timeout in seconds; then the process is killed.
-        most: Largest output in bytes. The process is killed if it writes more; then `most` + 1 bytes are
-            returned.
+        patience: Timeout in seconds. After this time the process is killed.
+        most: Largest output in bytes. If the process writes more, it is killed, and the function returns
+            `most` + 1 bytes.
 
     Returns:
         The output and the exit status. The status is None after a timeout.

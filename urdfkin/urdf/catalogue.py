@@ -1,16 +1,16 @@
 """Find robots by name in the catalogue and in robot_descriptions, and find ROS packages without ROS.
 
 The catalogue has the robots of example-robot-data and urdfkin's own. robot_descriptions is a Python package
-that clones the repository of a robot into its own cache at the first use. Of the modules of
-robot_descriptions, urdfkin imports only those in the package's own list of descriptions.
+that clones the repository of a robot into its own cache at the first use. urdfkin imports a module of
+robot_descriptions only if the list `DESCRIPTIONS` of this package contains its name.
 
 The search for a package uses the first of these folders that exists:
 
-1. The folders of `ROS_PACKAGE_PATH`, such as `src`: the folder itself if it is called `name`, then
-   `src/name`, then `src/*/name`.
+1. Each folder in `ROS_PACKAGE_PATH`, for example `src`. If `src` itself has the package's name, it is the
+   package. Otherwise the search tries `src/name` and `src/*/name`.
 2. `AMENT_PREFIX_PATH`: `share/name` below an entry.
-3. The folders above the file: a folder called `name`, a folder whose `package.xml` states this name, or a
-   subfolder called `name`.
+3. Each folder above the file. If the folder or its `package.xml` has the package's name, the folder is the
+   package. Otherwise the search tries the subfolder `name`.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ class Entry:
     Attributes:
         name: The short name.
         family: arm, hand, humanoid, quadruped, ...
-        relative_path: The path of the URDF below the folder of its collection.
+        relative_path: The path of the URDF, relative to the robots folder of urdfkin or of
+            example-robot-data.
         limbs: (base frame, tip frame) of each arm, leg or finger; the first pair is the default.
-        mimic: Whether the mimic rules of the URDF are valid and can be used.
-        reason: The reason, if `mimic` is False.
-        poses: Named poses. Each pose has joint values (rad, m) by joint name; joints that it does not name
-            are at 0.
+        mimic: Whether the mimic rules of the URDF are valid. If not, urdfkin ignores them by default.
+        reason: If `mimic` is False: the reason why the mimic rules are not valid.
+        poses: Named poses. Each pose maps joint names to joint values (rad or m). All other joints are at 0.
         own: True for a robot of urdfkin, False for a robot of example-robot-data.
     """
 

@@ -3,7 +3,8 @@
 The operating system limits the memory and time of the process. It also prevents the process from writing
 files and from starting other processes. Python raises an audit event for each opened file, new process,
 socket and import. An audit hook refuses every event that is not allowed. The process can remove neither the
-limits nor the hook. A program with full control of the interpreter may evade the hook, but not the limits.
+limits nor the hook. If a xacro file gained full control of the interpreter, it could circumvent the hook, but
+not the limits of the operating system.
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
 expressions of a file without Python's `eval`.
@@ -20,7 +21,7 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Memory limit in bytes. The interpreter and its libraries need a tenth of this limit.
+#: Memory limit in bytes. The interpreter and its libraries need about a tenth of this memory.
 MEMORY = 2 * 1024**3
 
 #: Audit events that are allowed without a check.
@@ -37,8 +38,8 @@ class Ground:
     Attributes:
         roots: Folders and files that may be read, without the hidden folders and files below them. The target
             of a symbolic link must also be one of these files, or lie in one of these folders.
-        installed: Folders whose symbolic links may lead to packages in other folders. An example is the
-            install folder of `colcon build --symlink-install`.
+        installed: Folders in which a symbolic link may point to a package in any other folder. An example is
+            the install folder of `colcon build --symlink-install`.
     """
 
     roots: list[str] = field(default_factory=list)
@@ -51,7 +52,8 @@ class Ground:
         Args:
             path: The xacro file.
             search: The folders on the user's search paths.
-            arguments: The values of the user's arguments; those that are paths may be read.
+            arguments: The values of the user's arguments. If a value is a path, the process may read the file
+                or folder at this path.
         """
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):

@@ -23,8 +23,8 @@ from urdfkin.urdf.xacro import arguments_of
 #: Functions of xacro that are removed, because they give an expression access to types and attributes.
 _NEVER = ("type", "vars")
 
-#: An expression that xacro's function evaluates and that urdfkin's function refuses.
-#: It shows whether the replacement of xacro's function took effect.
+#: xacro's own function evaluates this expression, but urdfkin's function refuses it. If the expression is
+#: refused, xacro calls urdfkin's function.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -67,7 +67,7 @@ def _expand(
 
 
 def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -> None:
-    """Replace the functions of xacro and xacrodoc that evaluate expressions and find packages.
+    """Make xacro and xacrodoc call urdfkin's functions to evaluate expressions and to find packages.
 
     Raises:
         RefusedError: the replacement has no effect.
@@ -107,7 +107,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
 
 
 def _tables(symbols: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the tables of names that a file can use: the global table, and the table of each namespace."""
+    """Yield the dicts of names for expressions: first the global names, then the names of each namespace."""
     yield dict(symbols)
     yield from (value for value in symbols.values() if isinstance(value, dict))
 

@@ -106,7 +106,7 @@ class _Evaluation:
                 return getattr(owner, name)
         if isinstance(owner, dict) and not name.startswith("_"):
             try:
-                return owner[name]  # a namespace, or the content of a YAML file
+                return owner[name]  # `owner` is a xacro namespace, or the content of a YAML file
             except (KeyError, AttributeError):
                 raise NameError(f"{name!r} is not defined in '{ast.unparse(node.value)[:80]}'") from None
         raise RefusedError(
@@ -177,10 +177,7 @@ class _Evaluation:
     GeneratorExp = ListComp
 
     def _rounds(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
-        """Yield an evaluation for each iteration of nested loops.
-
-        It knows the values of the loop variables.
-        """
+        """Yield an `_Evaluation` with the loop variables for each iteration of nested loops."""
         if not loops:
             yield self
             return
@@ -194,7 +191,8 @@ class _Evaluation:
 class _Scope(Mapping[str, Any]):
     """A lookup of names: first the names of a loop, then the names of the scope around the loop.
 
-    The names of the outer scope are not copied, because xacro evaluates names when they are read.
+    xacro evaluates a name when it is read. A copy of the outer scope would read every name, so this class
+    makes no copy.
     """
 
     def __init__(self, outer: Mapping[str, Any], own: Mapping[str, Any]) -> None:

@@ -48,7 +48,8 @@ def quoted(text: str, limit: int = QUOTED) -> str:
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: Number of characters of a line in an excerpt, and the number of these characters before the marked text.
+#: An excerpt of a long line has `SHOWN` characters. At most `BEFORE` of these characters precede the marked
+#: text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
@@ -58,7 +59,7 @@ class Excerpts:
     """Excerpts of one file: the line of a finding, with carets below the marked text.
 
     Args:
-        data: The bytes of the file after a byte order mark.
+        data: The bytes of the file without a byte order mark.
     """
 
     def __init__(self, data: bytes) -> None:
@@ -78,7 +79,7 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # decode each line once, because a line may have megabytes
+        if self.number != finding.line:  # decode each line only once, because a line may be megabytes long
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
@@ -115,8 +116,8 @@ class Fix:
 
     Attributes:
         edits: The edits of the text, in file order, without overlap.
-        turns: Bound on the angle (rad) by which the fix rotates the joint frame. 0: the robot does not
-            change.
+        turns: Upper bound on the angle (rad) by which the fix rotates the joint frame; 0 if the fix does not
+            change the robot.
     """
 
     edits: tuple[Edit, ...]
@@ -146,9 +147,9 @@ def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
 class Severity(Enum):
     """The severity of a finding.
 
-    An error makes the file unusable: it has no meaning, or two readers would read two different robots. A
-    warning is about legal content that is almost certainly a mistake, or that some readers read differently.
-    A note is information.
+    A file with an error is unusable: it describes no robot, or different URDF readers would build different
+    robots from it. A warning is about legal content. This content is almost certainly a mistake, or some
+    readers interpret it differently. A note is information.
     """
 
     ERROR = "error"
@@ -162,7 +163,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """Pinocchio's behaviour for legal content of a URDF, if this behaviour differs from the specification."""
+    """How Pinocchio differs from the URDF specification for content that the specification allows."""
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -176,17 +177,18 @@ class Finding:
         code: The stable code, for example `URDF502`.
         severity: Error, warning or note.
         message: The problem in one clause, without a full stop.
-        found: The text in the file that causes the finding, or None.
+        found: The wrong text in the file, in quotes, or None.
         remedy: The remedy, or None.
         file: The name of the file as given by the user, or `<text>`, `<stdin>`.
         line: Line, from 1.
         column: Column in characters, from 1.
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
-        oracle: Pinocchio's behaviour, if Pinocchio refuses the file for this reason or reads it differently;
-            otherwise None. If it is not None, no result of this robot can be verified with Pinocchio.
-        also: The lines of further findings of the same kind, which are combined into this finding.
-        width: Number of marked characters from `column` on; 0: no position in the text.
+        oracle: None if Pinocchio accepts the content and follows the specification. Otherwise Pinocchio
+            refuses the file or reads the content differently, and urdfkin cannot verify any result of this
+            robot with Pinocchio.
+        also: Line numbers of other findings with the same code, if urdfkin combines them with this finding.
+        width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 
     >>> import urdfkin
@@ -228,7 +230,7 @@ class Finding:
 
     @property
     def count(self) -> int:
-        """The number of findings that this object stands for: itself and those in `also`.
+        """The number of findings that this object represents: 1 plus the length of `also`.
 
         >>> import urdfkin
         >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
@@ -239,7 +241,7 @@ class Finding:
 
     @property
     def _others(self) -> str:
-        """A text that lists the lines of the findings in `also`."""
+        """The line numbers in `also` as text, for example "also on lines 3, 7"."""
         others = tuple(sorted(set(self.also) - {self.line}))
         if len(others) == len(self.also):
             return f"also on {_lines(others)}"
@@ -354,9 +356,9 @@ class Rule:
     """A kind of finding.
 
     Attributes:
-        id: The code: `URDF` and three digits. A code is never reused. The first digit is the family: 1 text
-            and XML, 2 elements and attributes, 3 numbers, 4 names and structure, 5 joints, 6 probable
-            mistakes, 7 inertials, geometry and materials.
+        id: The code: `URDF` and three digits. A code is never reused. The first digit shows the topic of the
+            rule. 1: text and XML. 2: elements and attributes. 3: numbers. 4: names and structure. 5: joints.
+            6: probable mistakes. 7: inertials, geometry and materials.
         slug: The short name.
         severity: The default severity of its findings.
         oracle: Pinocchio's behaviour, if it differs from the specification.
@@ -380,7 +382,7 @@ class Comment:
         text: The text between `<!--` and `-->`.
         line: The line, from 1.
         column: The column, from 1.
-        behind: Whether other text precedes the comment on the same line.
+        behind: Whether the line has other text before the comment.
         element: The next element, or None.
     """
 
@@ -466,19 +468,22 @@ class Silences:
         return silence.reason
 
 
-#: Limits of the search for names similar to a misspelt name: the number of misspelt names in a file, the
-#: number of known names to compare with, and the argument `work` of `nearest`.
+#: The search for the correct spelling of a misspelt name is slow. In one file, urdfkin searches for at most
+#: `SEARCHES` names, and compares each with at most `CANDIDATES` known names. `WORK` is the argument `work` of
+#: `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
-#: If a file has at least this number of warnings or notes with one code, they are combined into one finding.
-#: The second number is for the codes URDF7xx, which concern content that kinematics does not use.
+#: If a file has at least `FOLDED` warnings with one code, urdfkin combines them into one finding. The same
+#: applies to notes. For the codes URDF7xx (content that kinematics does not use), `FOLDED_EXTRAS` findings
+#: are enough.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: Number of errors with one code that are reported separately. Only the lines of further errors are listed.
+#: urdfkin reports at most this number of errors with one code separately. For further errors it only lists
+#: the line numbers.
 ERRORS_SHOWN = 100
 
-#: Largest number of findings with one code that are stored completely.
-#: Only the line of each further finding is stored.
+#: urdfkin stores at most this number of findings with one code completely. For further findings it only
+#: stores the line number.
 WRITTEN_OUT = 10_000
 
 
@@ -488,8 +493,9 @@ class _Kind:
 
     Attributes:
         severity: The severity.
-        found: The findings, each with its weight (see `Reporter.add`).
-        lines: The line of each finding after the first `WRITTEN_OUT` findings, which are in `found`.
+        found: Pairs of a finding and its weight (see the argument `weight` of `Reporter.add`). There are at
+            most `WRITTEN_OUT` pairs.
+        lines: The line numbers of all findings that are not in `found`.
     """
 
     severity: Severity
@@ -506,7 +512,7 @@ class Reporter:
         data: The bytes of the file, for the positions of attributes.
         limits: Limits on the size of the file and its parts.
         comments: The comments for urdfkin.
-        silenced: The findings that a comment silences, each with the reason.
+        silenced: Pairs of a finding that a comment silences, and the reason in this comment.
         silences: The parsed comments.
     """
 
@@ -542,17 +548,17 @@ class Reporter:
         Args:
             rule: The rule.
             message: The problem in one clause.
-            at: The element; without it, `position` is used.
-            attribute: Name of an attribute of the element `at`. The printed excerpt underlines this
-                attribute.
-            found: The text that causes the finding, quoted for printing.
+            at: The element with the problem. If it is None, the finding is at `position`.
+            attribute: Name of an attribute of the element `at`. The printed excerpt of the file underlines
+                this attribute.
+            found: The wrong text in the file, in quotes.
             remedy: The remedy.
-            owner: The tag for the message, if `at` is a link or joint in the wrong place. The default is the
-                tag of the link or joint that contains `at`.
+            owner: The tag that the finding names. None: the tag of the link or joint that contains `at`. Set
+                `owner` if `at` is a link or joint in the wrong place.
             severity: Severity of the finding; None: the severity of the rule.
-            position: (line, column) of the finding; used if there is no element.
+            position: Line and column of the finding, if `at` is None.
             weight: If findings of one kind are combined, the finding with the greatest weight is reported.
-            fix: A function that makes the automatic fix, called on demand; None: there is no automatic fix.
+            fix: A function that returns the automatic fix; None if there is no automatic fix.
         """
         severity = rule.severity if severity is None else severity
         # A comment cannot silence an error.
@@ -606,7 +612,8 @@ class Reporter:
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
         """Return up to three known names similar to `word`.
 
-        After `SEARCHES` calls the list is always empty, because the search is slow.
+        This search is slow. Therefore, only the first `SEARCHES` calls search. Later calls return an empty
+        list.
         """
         self._searches += 1
         if self._searches > SEARCHES:
@@ -614,7 +621,7 @@ class Reporter:
         return nearest(word, islice(known, CANDIDATES), work=WORK)
 
     def is_full(self, rule: Rule) -> bool:
-        """Return whether a rule has `WRITTEN_OUT` findings. Further findings of the rule are only counted."""
+        """Return whether the reporter stores only line numbers for further findings of a rule."""
         kind = self._kinds.get((rule.id, rule.severity))
         return kind is not None and len(kind.found) >= WRITTEN_OUT
 
@@ -629,9 +636,11 @@ class Reporter:
         """Return the findings by line.
 
         Args:
-            fold: Whether to combine many warnings of one kind into one finding. From the hundredth error of
-                one kind on, the errors are always combined.
-            wanted: A filter, called once for each finding, in file order; None: all findings.
+            fold: Whether to combine many warnings with one code into one finding. If `fold` is True and there
+                are more than a hundred errors with one code, the hundredth error lists the lines of the
+                others.
+            wanted: A function that returns whether to report a finding. It is called once for each finding,
+                in file order. None: all findings are reported.
         """
         kinds = [kind for kind in self._kinds.values() if kind.found]
         if wanted is not None:
@@ -720,7 +729,7 @@ class _AttributeSpan:
         line: Line, from 1.
         column: Column in characters, from 1.
         start: Index of the first byte of the attribute's name.
-        value: Two byte indices: the first byte of the value, and the closing quote.
+        value: Index of the first byte of the value, and index of the closing quote.
     """
 
     line: int
@@ -762,7 +771,10 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings of a kind. Many findings are combined into one, which lists the lines of all."""
+    """Return the findings with one code and severity.
+
+    If there are many, combine them into one finding that lists all lines.
+    """
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

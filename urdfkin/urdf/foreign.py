@@ -70,8 +70,8 @@ def text_of(source: Any) -> tuple[str, str] | None:
 def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
     """Return a finding for a yourdfpy robot whose rotations may be lost; none for any other source.
 
-    yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text. If the file writes a
-    rotation as quat_xyzw, the yourdfpy robot does not contain this rotation.
+    yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text of the file. If a joint in
+    the file has quat_xyzw, yourdfpy loses the rotation of this joint.
 
     Args:
         source: The object.
@@ -166,7 +166,8 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: A larger limit counts as no limit. Pinocchio stores the largest double for a missing limit.
+#: If a joint has no limit, Pinocchio stores the largest double. urdfkin therefore treats each limit above
+#: this number as missing.
 _ENDLESS = 1e300
 
 
@@ -176,8 +177,9 @@ class Modelled:
 
     Attributes:
         tree: The kinematic tree.
-        joints: For each link that coincides with a joint of the model: the index of this joint.
-        frames: For every other link: the index of its frame in the model.
+        joints: For each link whose frame is the frame of a Pinocchio joint: the index of this joint in the
+            model.
+        frames: For each other link: the index of its frame in the model.
     """
 
     tree: KinematicTree
@@ -205,7 +207,7 @@ def tree_of_model(source: Any) -> Modelled:
 
 
 class _ModelReader:
-    """Convert one model. The attributes of this object are intermediate results."""
+    """Convert one model to a kinematic tree. The attributes store intermediate results."""
 
     def __init__(self, model: Any) -> None:
         self.model = model
@@ -238,7 +240,10 @@ class _ModelReader:
         return name
 
     def read(self) -> Modelled:
-        """Convert the frames in their order (parents before children), then the moving joints."""
+        """Convert all frames, then all moving joints.
+
+        In a Pinocchio model, parent frames precede child frames.
+        """
         for i in range(len(self.frames)):
             self._frame(i)
         own = {

@@ -2,13 +2,16 @@
 
 MuJoCo compiles the file, which resolves defaults and classes. The tree is built from the compiled model:
 
-- A body becomes a link with the body's frame. A named site becomes a link on a fixed joint.
+- A body becomes a link with the body's frame. A site with a name becomes a link, which a fixed joint connects
+  to the link of its body.
 - The joints of a body move one after the other, each about its anchor p_k: F <- F Trans(p_k) J_k Trans(-p_k).
-  A body with several joints becomes several joints and links; the last link is the body's own.
-- A joint's reference value (`ref`) becomes part of the joint's origin, so that q equals MuJoCo's qpos. The
-  exception is the quaternion of a free joint: MuJoCo writes its scalar part first.
+  A body with several joints becomes a chain of joints and links. The last link of this chain represents the
+  body.
+- The joint origin includes the joint's reference value (`ref`), so that urdfkin's q has the same values as
+  MuJoCo's qpos. Only the order of quaternion numbers differs: MuJoCo writes the scalar part of a quaternion
+  first.
 
-Parts of the file that a tree cannot represent are listed in the result.
+The result lists the parts of the file that a kinematic tree cannot represent, for example tendons.
 
 MuJoCo can align the frame of a free body with its inertial frame (`align`, `alignfree`). The inertial frame
 depends on the shapes. To compile a file with this option, MuJoCo therefore needs the meshes.
@@ -58,7 +61,7 @@ class Listed:
     Attributes:
         what: A description in one clause.
         where: The tag and the name of the element, or the tag alone; None for the file.
-        moves: Whether this part affects the motion.
+        moves: Whether this part of the file affects the motion of the links.
         remedy: The remedy of a probable mistake; None for a part that is left out.
     """
 
@@ -78,11 +81,11 @@ class Mjcf:
         fused: The compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
         frames: For each link: "body" or "site", and the index of this body or site in MuJoCo's model.
         coordinates: For each moving joint, including mimic joints: its index in MuJoCo's qpos.
-        rules: The equalities that are mimic rules. Each entry is the index of the equality in the model and
-            the name of the mimic joint.
-        apart: Indices in the model of the other active equalities between joints. The tree does not represent
-            these equalities.
-        listed: The parts of the file that the tree does not represent.
+        rules: The equalities that the tree represents as mimic rules. The key is the index of the equality in
+            MuJoCo's model. The value is the name of the mimic joint.
+        apart: The active equalities between joints that the tree cannot represent as mimic rules, as indices
+            in MuJoCo's model.
+        listed: The parts of the file that the kinematic tree does not represent, and probable mistakes.
         whole: Whether `model` contains the shapes and inertias of the file.
         aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.
     """
@@ -118,8 +121,8 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), by `mj_kinematics`.
 
-        If there is a fused model, the placements come from the fused model. The placements of frames that it
-        does not contain come from `model`.
+        If `fused` is not None, this method uses the fused model for all frames in it. For the other frames it
+        uses `model`.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -129,7 +132,7 @@ class Mjcf:
         return out
 
     def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        """Return the body or site of the same name in the fused model, or None."""
+        """Return the body or site in `fused` with the same name as a frame of `model`, or None."""
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
@@ -139,7 +142,8 @@ class Mjcf:
     def lengths(self, q: FloatArray) -> FloatArray:
         """Return an upper bound (n, frames), in m, of each frame's distance from the world's origin.
 
-        The bound is the sum of the lengths along the path from the world to the frame. Error bounds use it.
+        The upper bound is the sum of the lengths of all translations from the world to the frame. It is used
+        in bounds on rounding errors.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -155,9 +159,10 @@ class Mjcf:
         return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
-        """Return a sum of angles (n, frames), in rad, for error bounds.
+        """For each frame, return a sum of joint angles (n, frames), in rad, for bounds on rounding errors.
 
-        For each frame, |q| + |ref| is added over all hinges with a reference value on the path to the frame.
+        The sum contains |q| + |ref| for each hinge between the world and the frame that has a reference value
+        `ref`.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -169,7 +174,7 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """Yield the index in the model, the kind, and the index in qpos of each joint of a body."""
+        """For each joint of a body, yield its index in the model, its kind, and its index in qpos."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         first = int(m.body_jntadr[body])
@@ -177,9 +182,10 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Return the value of each frame (n, frames), from the values `at_body` of the bodies (n, bodies).
+        """Convert a quantity per body, `at_body` (n, bodies), to a quantity per frame (n, frames).
 
-        A body's frame has the body's value. A site has its body's value plus the site's value in `own`.
+        The frame of a body has the quantity of this body. The frame of a site has the quantity of its body,
+        plus the quantity of the site in `own`.
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -190,7 +196,7 @@ class Mjcf:
     def residuals(self, q: FloatArray) -> FloatArray:
         """Return MuJoCo's residuals `efc_pos` (n, equalities) of the equalities between joints.
 
-        The entry of an inactive equality, or of an equality of another kind, is NaN.
+        The result is NaN for an equality that is inactive, or that is not between joints.
         """
         mujoco, m = library(), self.model
         off = mujoco.mjtDisableBit
@@ -207,10 +213,11 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """Return the sum (n, equalities) of the sizes of the terms in each mimic rule, for error bounds.
+        """Return the size (n, equalities) of each mimic rule, for bounds on rounding errors.
 
-        The size of y = y0 + c0 + c1 (x - x0) is |y0| + |c0| + |c1| (size of x + |x0|). This size is
-        multiplied by the number of rules in the chain plus one.
+        The size of the rule y = y0 + c0 + c1 (x - x0) is s = |y0| + |c0| + |c1| (size of x + |x0|). If x is
+        not a mimic joint, the size of x is |x|. Otherwise it is the value of s for the rule of x. The result
+        is s (k + 1), where k is the number of rules from the mimic joint y to an independent joint.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
@@ -272,8 +279,8 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
     Args:
         source: A path or text; included files are read, too.
         name: The name of the source in messages.
-        whole: True: MuJoCo compiles the unchanged file, with its meshes. False: shapes and inertias are
-            removed first, so that the meshes may be missing.
+        whole: True: MuJoCo compiles the unchanged file, with its meshes. False: urdfkin first removes the
+            shapes and the inertias, so that MuJoCo can compile the file without its mesh files.
 
     Raises:
         InputError: MuJoCo is not installed or does not accept the file, or the robot has a ball joint.
@@ -333,7 +340,7 @@ def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
 
 
 def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield the free bodies without moving descendants that MuJoCo aligns with their inertial frame."""
+    """Yield each free body that MuJoCo aligns with its inertial frame. It has no moving descendants."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
@@ -414,7 +421,8 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
     """Yield a finding if a file is in degrees, but the limits of its hinges are probably in radians.
 
-    The unit applies to the whole file, so the limits of every hinge must be implausibly small. The opposite
+    The angle unit applies to the whole file. Therefore, there is a finding only if the limits of all hinges
+    are implausibly small in degrees. The opposite
     mistake, degrees in a file in radians, is not reported: all hinges of some robots turn several times.
     """
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
@@ -436,7 +444,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # the alignment would use the placeholder inertias that are set below
+        # otherwise MuJoCo aligns the body frame with the placeholder inertia from the next loop
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -516,7 +524,7 @@ class _Reader:
             self._fix(T, here, link)
 
     def _joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """Return a joint with the origin T, and the pose of the body's frame in the joint's frame."""
+        """Return joint number `j` with the origin T, and the pose of the body's frame in the joint frame."""
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
         if kind == kinds.mjJNT_BALL:
@@ -587,7 +595,8 @@ class _Reader:
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
         """Return the name of the mimic joint y and its rule from an equality y - y0 = c0 + c1 (x - x0).
 
-        x0 and y0 are the reference values of the joints. Return None for an equality of another form.
+        x0 and y0 are the reference values of the joints. Return None if the equality is not linear, or
+        concerns only one joint.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])
@@ -599,14 +608,14 @@ class _Reader:
 
 
 def _leads(rules: dict[str, Mimic], joint: str, to: str) -> bool:
-    """Return whether the chain of mimicked joints from one joint contains another joint."""
+    """Return whether `joint` mimics `to`, directly or through other mimic joints."""
     while joint in rules and joint != to:
         joint = rules[joint].leader
     return joint == to
 
 
 def _resolve(rules: dict[str, Mimic], joint: str) -> Mimic:
-    """Return the mimic rule of a joint in terms of a joint that is not a mimic joint."""
+    """Combine a chain of mimic rules into one rule, whose mimicked joint moves independently."""
     rule = rules[joint]
     while rule.leader in rules:
         end = rules[rule.leader]

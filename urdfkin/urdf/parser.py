@@ -1,9 +1,9 @@
-"""The parser of URDF: from bytes to elements, and from elements to the records of links and joints.
+"""Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
-`read_document` checks that the bytes are UTF-8 and parses the XML to elements with positions. The
-XML parser is expat. It does not change names (`xacro:macro`), reports the position of every start tag, needs
-no stack for deep nesting, and opens no file. A document type definition with content stops the parser before
-it expands an entity.
+`read_document` checks that the bytes are UTF-8 and parses the XML to elements with positions. The XML parser
+is expat. It does not change names (`xacro:macro`), reports the position of every start tag, needs no stack
+for deep nesting, and opens no file. If a document type declaration defines entities or refers to an external
+file, parsing stops with an error. No entity is expanded.
 
 `read_robot` reads links and joints into records. Each attribute must have the right count of numbers, which
 are ASCII and finite: the grammar is `xs:double` without its special values, as in urdfdom. Nothing is guessed
@@ -66,7 +66,8 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "UTF-16"),
 )
 
-#: The bytes with which a file in UTF-16 or UTF-32 begins if it starts with '<' and has no byte order mark.
+#: The bytes of '<' in UTF-32 and UTF-16. Without a byte order mark, an XML file in UTF-32 or UTF-16 begins
+#: with these bytes.
 _WIDE = ((b"<\0\0\0", "UTF-32"), (b"\0\0\0<", "UTF-32"), (b"<\0", "UTF-16"), (b"\0<", "UTF-16"))
 
 _DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
@@ -81,7 +82,7 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
     """Return the bytes without a byte order mark if they are UTF-8; None after an error.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         data: The bytes of the file.
     """
     if not data.strip():
@@ -194,8 +195,7 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Largest depth of nested elements in older versions of libxml2. Programs that use these versions have this
-#: limit.
+#: Largest depth of nested elements in older versions of libxml2.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
@@ -210,7 +210,7 @@ _NAMES = frozenset({"name", "link", "joint"})
 
 
 class _Stop(Exception):  # noqa: N818  only for control flow
-    """Stop the parser after a finding that makes the rest of the file meaningless."""
+    """Stop the parser after an error, if urdfkin cannot interpret the rest of the file."""
 
 
 def read_document(report: Reporter) -> Element | None:
@@ -354,7 +354,7 @@ class _Builder:
             self.waiting.append(comment)
 
     def _is_behind_something(self) -> bool:
-        """Return whether the line has other text before the parser's position."""
+        """Return whether the current line has text other than white space before the parser's position."""
         data, start = self.report.data, self.parser.CurrentByteIndex
         while start > 0 and data[start - 1] in b" \t":
             start -= 1
@@ -373,7 +373,10 @@ class _Builder:
             )
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration, and stop before its content has an effect."""
+        """Report a document type declaration.
+
+        If it has definitions or refers to external ones, stop the parser.
+        """
         self.begun = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -434,9 +437,9 @@ class _Builder:
         )
 
     def _entity_name(self) -> str | None:
-        """Return the first entity after the position of an error.
+        """Return the name of the first undefined entity after the position of an error.
 
-        The entities that XML defines itself do not count.
+        XML defines `lt`, `gt`, `amp`, `quot` and `apos`.
         """
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
@@ -491,9 +494,8 @@ class NumberReader:
     """Reader of numbers in attributes, which reports invalid numbers.
 
     Attributes:
-        report: The reporter, which receives the findings.
-        bad_number: The rule for an invalid number. Numbers that kinematics does not use have a different
-            rule.
+        report: This object collects the findings.
+        bad_number: The rule for an invalid number. The default rule is for numbers that kinematics uses.
         bad_vector: The rule for an attribute with too few or too many numbers.
     """
 
@@ -575,7 +577,10 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Return whether a text is too long to be converted to numbers, which takes quadratic time."""
+        """Return whether a text is too long for a number, and report it.
+
+        Its conversion takes quadratic time.
+        """
         if len(written) <= most:
             return False
         self.report.add(
@@ -623,7 +628,7 @@ _PLAIN = ("origin", "axis", "limit")
 #: Leading zeros of a character reference. Python cannot convert a number with thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
-#: For each pattern of an invalid number: the remedy. The remedy of the first matching pattern is used.
+#: Pairs of a pattern for an invalid number, and the remedy. The first matching pattern determines the remedy.
 _REMEDIES = (
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*\$[({].*", "expand the xacro first"),
@@ -749,7 +754,10 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def named(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint. If it has no name, add a finding and return an empty string."""
+    """Return the name of a link or joint.
+
+    If the name is missing, add a finding and return an empty string.
+    """
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -805,8 +813,8 @@ class JointReader:
             element: The element.
             attribute: The name of the attribute.
             example: An example for the remedy.
-            number: Whether the attribute is a number. This method does not report an empty value of such an
-                attribute, because `NumberReader` reports it.
+            number: Whether the value of the attribute is a number. If True, this method does not report an
+                empty value, because `NumberReader` reports it.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -891,7 +899,7 @@ class JointReader:
             joint.axis = self.numbers.vector(axis, "xyz")
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
-            return  # URDF212 reports the value between the tags
+            return  # rule URDF212 reports text between <axis> and </axis>
         self.report.add(
             EMPTY_AXIS,
             "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
@@ -967,8 +975,7 @@ def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 
-#: Largest length of a word that is compared with the words of URDF.
-#: Words that are longer than this are not similar to any word of URDF.
+#: Longer words cannot be similar to a tag or attribute name of URDF, so `nearest_tag` returns None for them.
 _LONGEST_WORD = 32
 
 

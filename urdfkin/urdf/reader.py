@@ -122,11 +122,13 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 
 
 def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
-    """Return the mimic rule of each mimic joint, in terms of a joint that is not a mimic joint.
+    """Return the mimic rule of each mimic joint.
 
-    A chain of rules is composed into one rule: y = m2 (m1 x + b1) + b2. Composition starts at the joint x,
-    which is not a mimic joint. Each joint is visited once. The operations have the same order as in the
-    oracle, so that urdfkin and the oracle have equal rounding errors.
+    The mimicked joint of each returned rule moves independently.
+
+    In a file, a mimic joint may follow another mimic joint. This function combines such a chain into one
+    rule: y = m2 (m1 x + b1) + b2, where x is not a mimic joint. It combines the rules in the same order as
+    Pinocchio, beginning at x, so that urdfkin and Pinocchio have equal rounding errors.
     """
     named = {joint.name: joint for joint in joints}
     resolved: dict[str, Mimic] = {}

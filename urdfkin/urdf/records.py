@@ -1,7 +1,7 @@
 """Plain data for the elements, links and joints of a URDF, which `urdf.parser` reads. Size limits of a URDF.
 
-In the records of links and joints, None marks a value that could not be read; a finding reports it. A value
-that the file omits has the default of the specification.
+If the parser cannot read a value of a link or joint, it reports a finding, and the value in the record is
+None. If the file omits a value, the record contains the default of the specification.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Largest number of nested elements that Pinocchio accepts.
-#: Its XML parser, tinyxml2, counts the document as level 1 and refuses level 500.
+#: Largest number of nested elements that Pinocchio accepts. Pinocchio's XML parser, tinyxml2, refuses level
+#: 500, and it counts the document itself as level 1.
 ORACLE_DEPTH = 498
 
 
@@ -21,13 +21,13 @@ class Limits:
 
     Attributes:
         bytes: Size of the file.
-        depth: Levels of nested elements; urdfdom's parser refuses more.
+        depth: Number of levels of nested elements; urdfdom's parser refuses more.
         elements: Number of elements.
         attributes: Number of attributes of one element.
-        name: Characters in the name of an element, an attribute, a link or a joint.
-        number: Characters in one number.
-        markup: Bytes of one tag, comment or processing instruction; the size is measured to within 10 %.
-            libxml2 has the same limit.
+        name: Number of characters in the name of an element, an attribute, a link or a joint.
+        number: Number of characters of one number.
+        markup: Number of bytes of one tag, comment or processing instruction. urdfkin measures this size to
+            within 10 %. libxml2 has the same limit.
     """
 
     bytes: int = 100_000_000

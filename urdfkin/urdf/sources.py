@@ -32,10 +32,10 @@ class Origin:
         mimic: The argument `mimic`.
         root_joint: The argument `root_joint`.
         xacro_args: Names and values of the xacro arguments.
-        oracle: The argument `oracle`, the name of an oracle; None for the default.
-        table: Whether the robot comes from a Denavit-Hartenberg table. The convention of the table
-            determines the frames between base and tip.
-        sha256: The digest of the MJCF or USD file behind the URDF; empty if the source is a URDF.
+        oracle: The argument `oracle`: the name of the library that checks the results; None for the default
+            library.
+        table: Whether the robot comes from a Denavit-Hartenberg table.
+        sha256: If the source is an MJCF or USD file: the digest of this file. Otherwise empty.
         lock: Name and value (rad or m) of each locked joint. Mimic joints are not listed; they are locked
             with their mimicked joint.
         variants: Variant sets and variants that were selected in a USD stage.
@@ -64,7 +64,7 @@ class Origin:
 
     @property
     def again(self) -> str:
-        """The argument with which `load` reads the robot again; for a text it is `-` (standard input)."""
+        """The source for a new call of `load`; `-` (standard input) if the source was a text."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
@@ -134,16 +134,16 @@ Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """The content of a URDF, with its source.
+    """The bytes of a URDF, and information about the source of these bytes.
 
     Attributes:
         data: The bytes.
-        label: The name in messages: the path, `<text>`, `<stdin>`.
+        label: The name in messages, for example the path, `<text>` or `<stdin>`.
         source: The path or name from which the source can be read again; for a source without a name,
             `<text>`, `<bytes>` or `<file>`.
         entry: The catalogue entry, or None.
         xacro_args: Names and values of the xacro arguments.
-        sha256: The digest of the MJCF or USD file behind the URDF; empty for a URDF.
+        sha256: If the URDF was converted from an MJCF or USD file: the digest of that file. Otherwise empty.
         variants: Variant sets and variants that were selected in a USD stage.
         articulation: The articulation that was chosen in a USD stage, or None.
     """
@@ -166,9 +166,9 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
 
     Args:
         source: One of the sources in the module docstring.
-        most: Size limit in bytes; for an open text file, in characters. At most one byte or character more is
-            read, which shows that a source is too long. Therefore even an infinite device, such as
-            `/dev/zero`, ends the reading.
+        most: Size limit in bytes; for an open text file, in characters. To detect a source that is too long,
+            the function reads at most one more byte or character. Therefore the function also stops at an
+            infinite device such as `/dev/zero`.
         xacro_args: Arguments for a .xacro file, which is expanded.
 
     Raises:
@@ -279,7 +279,8 @@ def _in_package(name: str, path: str) -> Path:
 
 
 def _encode(content: str | bytes, label: str, source: str) -> Text:
-    # UTF-8 has no lone surrogate; "surrogatepass" encodes one as bytes that the checks reject.
+    # A Python string may contain a lone surrogate, which UTF-8 does not allow. With "surrogatepass", `encode`
+    # does not raise an error, and the checks of the bytes report the surrogate.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return Text(data, label, source)
 

@@ -1,11 +1,11 @@
 """Convert the UsdPhysics joints of a USD stage to a kinematic tree.
 
 - A prim with `PhysicsRigidBodyAPI` becomes a link with the prim's frame, without its scale. A plain `Xform`
-  of a body becomes a link on a fixed joint.
-- A joint prim contains the pose A of the joint frame in the first body, and its pose B in the second body.
-  With the joint's motion J(q), the pose of the second body in the first body is A J(q) B^-1. If the second
-  body is the parent in the tree, the pose of the first body in the second body is B J(q)^-1 A^-1: the same
-  form with the opposite axis.
+  below a body also becomes a link, which a fixed joint connects to the body.
+- A joint prim contains the pose A of the joint frame in the first body, and the pose B of the joint frame in
+  the second body. Let J(q) be the motion of the joint. The pose of the second body in the first body is A
+  J(q) B^-1. If the second body is the parent in the tree, urdfkin needs the inverse, B J(q)^-1 A^-1. The
+  inverse has the same form, with A and B exchanged and the opposite joint axis.
 - Lengths are multiplied by `metersPerUnit`, angles are converted from degrees. A stage whose up axis is Y is
   rotated, so that z is up.
 - Joints that close a loop, point to nothing or are excluded from the articulation are findings.
@@ -53,13 +53,15 @@ from urdfkin.urdf.sources import USD
 
 #: Largest number of layers of a stage.
 _LAYERS = 1_000
-#: Largest number in single precision. In a file, this number or infinity means that there is no limit.
+#: Largest number in single precision. A USD file contains this number or infinity if a joint has no limit.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Largest cosine between two axes of a frame without shear, for each prim on the path. Its unit is the
-#: largest relative error u of rounding to single precision. In a rotation matrix of rounded numbers, each
-#: entry has an error of u. The product of two such matrices in single precision adds 3 u to each entry. The
-#: scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u, which is below 14 u. Rounding a
-#: quaternion changes its length by u, and the cosine between two axes by 4 u.
+#: Rounding can make the axes of a frame appear not perpendicular. If the cosine between two axes is at most
+#: `_SHEAR` * u * n, the frame has no shear. Here, n is the number of prims on the path to the prim of the
+#: frame, and u is the largest relative error of rounding to single precision. If a file stores a rotation
+#: matrix, each entry has an error of u. The multiplication of two such matrices in single precision adds an
+#: error of 3 u to each entry. Therefore the scalar product of two columns has an error of at most 4 * 2
+#: sqrt(3) u, which is below 14 u. If a file stores a quaternion, rounding changes the length of the
+#: quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
 #: Limits of a joint up to this number hold it at one value, whether they are degrees or radians.
 _SMALLEST_ANGLE = 0.01
@@ -74,7 +76,8 @@ _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Endings of the type names of joints that a tree cannot represent.
 #: OpenUSD recognizes such a type as a joint only if the plugin that defines it is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Coefficients of the quadratic and higher terms of a MuJoCo joint equality. A mimic rule has no such terms.
+#: Coefficients of the quadratic and higher terms of a MuJoCo joint equality. A mimic rule is linear, so it
+#: cannot contain these terms.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
@@ -96,7 +99,7 @@ class Remark:
 
     Attributes:
         kind: The kind.
-        where: The path of the prim; empty for the stage.
+        where: The path of the prim; empty if the remark is about the whole stage.
         what: A description in one clause.
         remedy: The remedy, or None.
     """
@@ -120,7 +123,8 @@ class JointReading:
         p1: (3,) origin of the joint's frame in the second body, m.
         quat1: (4,) unit quaternion of the joint's frame in the second body, scalar last.
         limits: Lower and upper limit, rad or m.
-        size: Sum of the lengths (m) of the vectors that were added to compute `p0` and `p1`.
+        size: `p0` and `p1` are sums of vectors. `size` is the sum of the lengths (m) of these vectors, for
+            error bounds.
     """
 
     free: str
@@ -144,15 +148,15 @@ class Usd:
 
     Attributes:
         tree: The links and joints.
-        prims: For each link with a prim: the prim's path.
-        rest: (n, 4, 4) placement in the world of each prim of `prims`, which UsdGeom computes; in m, with z
-            up.
+        prims: For each link that represents a prim: the path of the prim.
+        rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up. UsdGeom computes these
+            poses.
         rest_q: (nq,) configuration of the robot in the stage.
-        single: For each joint of the tree by name: five numbers for the effect of rounding to single
-            precision. The first two are bounds on the translation (m) and the rotation (rad) of the joint's
-            frames. The third is the length (m) of the vectors that rotate with the frames. The fourth is a
-            bound on the relative change of the joint's value by its mimic rule. The last is the length (m) of
-            the origin of the joint's frame in its child.
+        single: For each joint name: five numbers that describe the effect of rounding to single precision.
+            Number 1: a bound (m) on the error of the joint origins. Number 2: a bound (rad) on the error of
+            the joint orientations. Number 3: the sum of the lengths (m) of the vectors that these orientation
+            errors rotate. Number 4: a bound on the relative error of the joint value if a mimic rule computes
+            it, otherwise 0. Number 5: the distance (m) between the joint frame and the frame of the child.
         joints: The numbers of each joint prim of the tree. The key is the path of the prim.
         stage: The stage.
         unit: metersPerUnit.
@@ -239,7 +243,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Refuse value clips. They refer to files that USD's list of dependencies does not contain."""
+    """Refuse value clips. USD does not list the files of value clips as dependencies of a layer."""
     found: list[str] = []
 
     def look(path: Any) -> None:
@@ -307,8 +311,8 @@ def read_usd(
     Args:
         path: The file.
         name: The name of the file in messages.
-        variants: Pairs (variant set, variant). In this order, each variant is selected in all prims that have
-            the variant set.
+        variants: Pairs (variant set, variant). For one pair after the other, the variant is selected in all
+            prims that have the variant set.
         articulation: Path or name of the articulation to read; None if there is only one.
 
     Raises:
@@ -337,8 +341,9 @@ def read_usd(
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
     """Select variants in the session layer, so that no file changes.
 
-    OpenUSD cannot select a variant inside an instance. Instances that contain the variant set are therefore
-    expanded, also in the session layer. Return the paths of the expanded instances.
+    OpenUSD cannot select a variant inside an instance. If an instance contains the variant set, this function
+    therefore makes the prim non-instanceable, also in the session layer. This operation expands the instance.
+    Return the paths of the expanded instances.
 
     Raises:
         UnknownNameError: no prim has such a variant set, or such a variant.
@@ -389,8 +394,8 @@ class _Body:
 class _Edge:
     """A joint prim.
 
-    `ends` contains the paths of its two bodies (None: the world). `frames` contains the poses of the joint
-    frame in the two bodies.
+    `ends` contains the paths of the two bodies that the joint connects; None is the world. `frames` contains
+    two poses of the joint frame: its pose in the first body, and its pose in the second body.
     """
 
     prim: Any
@@ -543,7 +548,7 @@ class _Reader:
             prim = prim.GetParent()
 
     def _uneven(self, prim: Any) -> str | None:
-        """Return a text about the nearest ancestor of a prim that has a non-uniform scale, or None."""
+        """Return a text about the nearest ancestor with a non-uniform scale, or None."""
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -621,13 +626,14 @@ class _Reader:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # this schema describes the rule of NewtonMimicAPI again, with terms of higher degree
+                # `MjcEqualityJointAPI` repeats the rule of `NewtonMimicAPI`, and may add terms of higher
+                # degree
                 if more := [name for name in _HIGHER if self._value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._say("left-out-of-usd", path, what)
                 continue
             unread.append(schema)
-        # for a joint that is not in the tree, there already is a remark
+        # if the joint is not in the tree, `remarks` already contains the reason
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
@@ -690,17 +696,21 @@ class _Reader:
         return edge
 
     def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
-        """Return a pose in the axes of the stage. Only a pose in the world (`body` is None) changes."""
+        """Convert a pose in the world (`body` is None) to the stage's up axis.
+
+        Return a pose in a body unchanged.
+        """
         return T if body is not None else pose(self._up.T) @ T
 
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return one body of a joint, and data of the joint frame; None if no prim is defined at the target.
+        """Return the first or second body of a joint with its joint frame; None if the target does not exist.
 
-        The data are the pose of the joint frame in the body (m), and the sum of the lengths (m) of the
-        vectors in its origin. The other data are two bounds on the effect of rounding to single precision:
-        the translation (m) and the rotation (rad) of the frame.
+        The result has four entries. The first entry is the path of the body; None is the world. The second
+        entry is the pose of the joint frame in the body (m). The origin of this pose is a sum of vectors; the
+        third entry is the sum of their lengths (m). The fourth entry is a pair of bounds on rounding to
+        single precision: how far it moves (m) and rotates (rad) the joint frame.
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
@@ -733,15 +743,16 @@ class _Reader:
         return body, A, length, off
 
     def _stored(self, path: str | None, body: str | None, length: float) -> tuple[float, float]:
-        """Return how far rounding to single precision can move (m) and turn (rad) a prim below a body.
+        """Bound how far rounding to single precision moves (m) and rotates (rad) a prim relative to a body.
 
-        A transform in double precision is not rounded. A rotation in single precision turns its prim and
-        moves the prims below. A transform in half precision has no bound here, so the result is 0.
+        The bounds are 0 if the file stores all transforms in double precision. If the file stores a rotation
+        in single precision, rounding rotates the prim, and moves the prims below. The function ignores
+        transforms in half precision.
 
         Args:
             path: Path of the prim.
-            body: Path of the body; None: the world.
-            length: Sum of the lengths of the translations between the two (m).
+            body: Path of the body; None is the world.
+            length: Sum of the lengths (m) of the translations from the body to the prim.
         """
         moved = turned = False
         geometry, prim = self.pxr.UsdGeom, self.stage.GetPrimAtPath(path)
@@ -798,9 +809,9 @@ class _Reader:
             self._say("unused-in-usd", path, "the limits of this planar or floating joint are not read")
 
     def _six(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return the result of `_motion` for a generic joint, which has a limit for each direction.
+        """Return the same tuple as `_motion` for a `PhysicsJoint`, which has limits for six directions.
 
-        A direction whose lower limit is above its upper limit is locked.
+        If the lower limit of a direction is above its upper limit, the joint does not move in this direction.
         """
         free, limits = [], {}
         for freedom in _FREEDOMS:
@@ -828,11 +839,11 @@ class _Reader:
         )
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return the lower or upper limit of one direction of a generic joint.
+        """Return the lower or upper limit of a `PhysicsJoint` in one of its six directions.
 
         Raises:
-            InputError: the stage blocks the limit. For a blocked limit, OpenUSD's parser of UsdPhysics does
-                not read the default.
+            InputError: a layer of the stage contains `None` for the limit. OpenUSD's parser of UsdPhysics
+                does not replace `None` by the default value, unlike other readers.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
@@ -1052,7 +1063,7 @@ class _Reader:
         return len(set(below)) > 1
 
     def _short(self, path: str) -> str:
-        """Return a prim's name, preceded by names of its ancestors if other bodies have the same name."""
+        """Return the name of a prim. If other bodies have this name, add names of ancestors before it."""
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
@@ -1069,7 +1080,7 @@ class _Reader:
     def _joints(
         self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
-        """Yield the joint; also a link and a fixed joint if the child's frame is not on the joint axis."""
+        """Yield the joint with its two links, and a fixed joint if the child frame is not on the axis."""
         (A, B), (parent, child) = edge.frames, edge.ends
         axis = edge.axis
         shares = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
@@ -1158,9 +1169,9 @@ class _Reader:
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Some plain Xforms below a body mark a frame. Yield each of them with the path of the body.
+        """Yield the path of each plain Xform that becomes a link, and the path of its body.
 
-        An Xform that only groups shapes does not mark a frame, and neither does an instance.
+        An Xform becomes no link if it only groups shapes, or if it is an instance.
         """
         physics, geom = self.pxr.UsdPhysics, self.pxr.UsdGeom
 
@@ -1224,7 +1235,7 @@ class _Reader:
             yield names[path], Mimic(names[leader_path], multiplier, offset)
 
     def _rules(self, edge: _Edge) -> Iterator[tuple[str, float, float]]:
-        """Yield the mimic rules of a joint: path of the mimicked joint, multiplier, offset (rad or m)."""
+        """Yield each mimic rule of a joint: (path of the mimicked joint, multiplier, offset in rad or m)."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
@@ -1251,7 +1262,7 @@ class _Reader:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
     def _ratio(self, edge: _Edge, leader: str) -> float:
-        """Return the unit factor of a multiplier, which is 1; report a rule between an angle and a length."""
+        """Return 1, the unit factor of a multiplier. Report a mimic rule between an angle and a length."""
         kinds = {edge.path: edge.kind for edge in self._edges}
         slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
         if len(slides) > 1:
@@ -1323,7 +1334,7 @@ class _Reader:
             )
 
     def _layers(self, paths: Sequence[str]) -> None:
-        """Report each layer of these prims whose unit or up axis differs from that of the stage."""
+        """Report each layer that describes one of the prims in another unit or up axis than the stage."""
         root = self.stage.GetRootLayer()
         known = {root, self.stage.GetSessionLayer()}
         above = {str(one) for path in paths for one in self.pxr.Sdf.Path(path).GetPrefixes()}
@@ -1336,7 +1347,10 @@ class _Reader:
                     self._layer(layer.pseudoRoot, name, prim)
 
     def _layer(self, root: Any, name: str, prim: Any) -> None:
-        """Compare a layer with the stage; `prim` is the first prim that it describes."""
+        """Compare the unit and the up axis of a layer with the stage.
+
+        `prim` is the first prim in the layer.
+        """
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
@@ -1368,7 +1382,7 @@ class _Reader:
     def _is_resolved(self, prim: Any) -> bool:
         """Return whether a prim or an ancestor has the operation `unitsResolve`.
 
-        By convention, this operation corrects the unit and the up axis of a referenced layer.
+        By convention, `unitsResolve` converts a referenced layer to the unit and the up axis of the stage.
         """
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
@@ -1397,9 +1411,10 @@ def _rounding(x: FloatArray) -> FloatArray:
 def _turned(xyzw: FloatArray) -> float:
     """Return a bound (rad) on the change of a rotation when its quaternion's numbers are rounded.
 
-    The rotation changes by twice the angle between the quaternions. Only the component of the change that is
-    perpendicular to the quaternion matters. Each number changes by at most its rounding error, so the changes
-    form a box. The largest perpendicular component is at a corner of this box.
+    The rotation changes by twice the angle between the exact and the rounded quaternion. Rounding changes
+    each of the four numbers by at most its rounding error, so the change is a vector in a four-dimensional
+    box. Only the component of this vector that is perpendicular to the quaternion changes the rotation. This
+    component is longest at a corner of the box, so the function compares all corners.
     """
     unit = xyzw / np.linalg.norm(xyzw)
     corners = _rounding(xyzw) * np.array(list(product((-1.0, 1.0), repeat=4)))

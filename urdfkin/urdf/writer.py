@@ -1,7 +1,8 @@
 """Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
-A reader of the text gets the same numbers bit for bit. A joint's rotation is written as roll, pitch and yaw,
-which reproduce it up to rounding.
+Each number in the text is written with enough digits to restore the same double. A joint's rotation is
+written as roll, pitch and yaw. A program that reads roll, pitch and yaw computes the same rotation up to
+rounding.
 
 An insertion is an `Edit`. Its position is computed from `Element.offset`, which does not count a byte order
 mark. The inserted text has the indentation and line ends of the text around it.
@@ -23,8 +24,8 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    URDF 1.0 has no notation for an infinite effort or velocity limit. A file with such a limit declares
-    version 1.2, which allows the attribute to be missing.
+    URDF 1.0 has no notation for an infinite effort or velocity limit. If a joint has an infinite limit, the
+    file therefore declares version 1.2, in which the attribute may be missing.
 
     Args:
         tree: The robot.

@@ -6,8 +6,8 @@ without ROS.
 
 xacro ignores an argument that the file does not declare; urdfkin raises an error. To find the declared
 arguments, the separate process reads the file and its includes. An include cannot be read if its name is
-computed, if the file is not found, or if the file is not allowed. If an include cannot be read, urdfkin
-accepts every argument.
+computed, if the file is not found, or if the file is not allowed. If an include cannot be read, urdfkin does
+not know all declared arguments, so it accepts any argument of the user.
 """
 
 from __future__ import annotations
@@ -132,8 +132,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
     Raises:
         SourceError: the file does not exist.
         UnknownNameError: the file does not declare an argument.
-        XacroError: xacrodoc is not installed; xacro cannot expand the file; or the file needs something that
-            is not allowed (other files, programs, too much memory or time).
+        XacroError: xacrodoc is not installed, or xacro cannot expand the file. For example, the xacro code
+            opens a forbidden file, starts a program, or needs too much memory or time.
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))

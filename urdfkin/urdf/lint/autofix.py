@@ -1,20 +1,21 @@
 """Apply automatic fixes to a URDF, check that the robot does not change, and write the changes as a patch.
 
-A fix is accepted under three conditions:
+urdfkin accepts a fix if three conditions hold:
 
 - The new file has fewer findings with the code of the fix.
 - The new file has no new findings.
-- The new file describes the same robot. All names, limits and other numbers that URDF readers use are equal,
-  with two exceptions. The direction of an axis may differ by rounding. The angles of an origin may differ by
-  at most `Fix.turns`.
+- The new file describes the same robot. The names, limits and other numbers are equal if a URDF reader uses
+  them. There are two exceptions. Rounding may change the direction of a joint axis. The rotation of a joint
+  origin may change by at most `Fix.turns` (rad).
 
 
 Write the changes of `--fix` as a patch for `git apply` that is safe to print.
 
-A patch contains whole lines of the file. A line can contain text that controls a terminal or a CI service:
-a mark for the writing direction, an escape sequence, a workflow command. If such text were escaped, the line
-would change and `git apply` would refuse the patch. For such a file the output is therefore git's binary
-patch, which has ASCII characters only. The readable patch is a comment above the binary patch.
+A patch contains whole lines of the file. A line can contain text that controls a terminal or a CI service,
+for example an escape sequence or a GitHub workflow command. If urdfkin escaped this text, the line would
+change, and `git apply` would refuse the patch. If a file contains text of this kind, urdfkin therefore writes
+git's binary patch, which has only ASCII characters. Above the binary patch, urdfkin writes the readable patch
+as a comment.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Largest number of passes over a file. A pass applies the fixes of one code. Fixes that overlap need further
-#: passes.
+#: Largest number of passes over a file. One pass applies the fixes of one code. If two fixes overlap, the
+#: second fix needs another pass.
 PASSES = 100
 
 #: Bound (rad) on the rotation of a unit vector when each of its three numbers is rounded to a double.
@@ -51,7 +52,7 @@ class Mended:
     Attributes:
         text: The fixed file.
         fixed: The fixed findings.
-        kept: The reasons why fixes were not applied. The key is the code.
+        kept: For each code whose fixes were not applied: the reason.
     """
 
     text: Text
@@ -67,8 +68,8 @@ def mend(
     Args:
         text: The file.
         look: A function that checks a text and returns all findings.
-        choose: A function that returns a filter for the findings to fix. This function is called once for
-            each pass.
+        choose: A function that returns a filter, which selects the findings to fix. `mend` requests a new
+            filter for each pass over the file.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -98,8 +99,9 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     """Yield the reasons why a fix must not be applied."""
     code = fixable[0].code
-    # Only a limited number of findings of one code is stored. If a file has more, a fix of one finding can
-    # bring up another that was not stored, which would look new. Such codes are skipped.
+    # urdfkin stores only a limited number of findings with one code. If a file has more, a fix of one finding
+    # lets urdfkin store another one, which would look like a new finding. Therefore the comparison skips
+    # these codes.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -120,7 +122,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences between two robots, without differences that have no effect.
+    """Yield differences between two robots. Ignore unused values, such as the axis of a fixed joint.
 
     Args:
         a: The first robot.
@@ -151,8 +153,8 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor on the bound `Fix.turns`. The bound is a sum of doubles; the factor covers the rounding errors of
-#: this sum.
+#: Factor on the bound `Fix.turns`. This bound is a sum of doubles, and the factor allows for the rounding
+#: errors of the sum.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
@@ -167,7 +169,7 @@ def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) ->
 
 
 def _limits(joint: JointRecord) -> tuple[float | None, ...]:
-    """Return those limits of a joint that matter for its type.
+    """Return the limits of a joint that have an effect for its joint type.
 
     For example, a continuous joint has no position limits.
     """

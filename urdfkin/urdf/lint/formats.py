@@ -24,13 +24,13 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
     """Return one SARIF run with every code as a rule and every finding as a result.
 
-    The codes for MJCF and USD files are listed as rules only if a finding has such a code.
+    The run contains a rule about MJCF or USD files only if a finding has the code of this rule.
 
     Args:
         findings: The reported findings.
         version: The version of urdfkin.
-        silenced: The findings that comments silence, each with its reason. SARIF marks them as "suppressed in
-            source".
+        silenced: Pairs of a finding that a comment silences, and the reason in this comment. In SARIF, these
+            findings are marked as "suppressed in source".
     """
     codes = {finding.code for finding in findings}
     rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
@@ -164,8 +164,9 @@ def as_json(
 
     `{"schema": "urdfkin-findings", "version": 1, "urdfkin": "...", "files": [...], "findings": [...],
     "silenced": [...]}`. An entry of "findings" has the fields of `Finding`, and the field `title` with the
-    title of the finding's code. An entry of "silenced" also has `reason`, the reason in the comment. The
-    positions in a `fix` are in bytes and do not count a byte order mark.
+    title of the finding's code. An entry of "silenced" has one more field, `reason`: the reason in the
+    comment that silences the finding. The positions in a `fix` are byte indices. The byte after a byte order
+    mark has the index 0.
     """
     document = {
         "schema": "urdfkin-findings",

@@ -1,10 +1,11 @@
 """Find a rule by its code, and return the documentation of each rule as data and as text.
 
-A topic is a module that defines rules: the parser, or a module of `lint.rules`. The pages of a topic are in a
-TOML file with the module's name, beside the module. The file is read on demand. The entries `cure`, `others`
-and `question` at the top of a TOML file are defaults for all its pages. The table `parts` defines texts that
-replace `{name}` in examples. Such a text is a string, or a pair [text, times] for a repeated text, in which
-`{i}` is the index of the repetition. Line breaks in prose have no meaning.
+Each module that defines rules is a topic. These modules are the parser and the modules in `lint.rules`. A
+TOML file in the same folder, with the same name as the module, contains the documentation of the topic's
+rules. The file is read on demand. The documentation of one rule is called a page. If the top of the file
+defines `cure`, `others` or `question`, the pages without this entry use it. The table `parts` defines texts
+that replace `{name}` in examples. Such a text is a string, or a pair [text, times] for a repeated text, in
+which `{i}` is the index of the repetition. Line breaks in prose have no meaning.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda r
 #: The rules about MJCF and USD files. The key is the code.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: The code of each rule. The key is a name of the rule in lower case. Each rule has three names: its code,
-#: the digits of its code, and its short name.
+#: For each name of a rule, in lower case: the code of the rule. Each rule has three names: its code, the
+#: digits of its code, and its short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
@@ -51,13 +52,13 @@ class Page:
     """The documentation of a rule.
 
     Attributes:
-        title: The problem in one line, for tables of rules.
+        title: The problem in one line. This line is also in the tables of all rules.
         why: The consequences of the problem for a user.
-        example: A minimal example with the problem: a whole document, or the content of `<robot>`. The links
-            `base` and `tip` are added to an example that begins with a joint or a comment.
+        example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
+            example begins with a joint or a comment, urdfkin adds the links `base` and `tip` to it.
         cure: The corrected example.
         others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
-        question: The related entry of the questions page, or None.
+        question: The entry about this problem on the page of questions and answers, or None.
     """
 
     title: str

@@ -49,18 +49,20 @@ def check(
 
     Args:
         source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
-        limits: Limits on the size of the file.
-        mimic: Whether mimic joints follow their mimicked joints. False: problems with mimic joints are notes.
-            None: True, except for robots of the catalogue with invalid mimic rules.
+        limits: Limits on the size of the file, its elements, names and numbers.
+        mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
+            are notes. The default is True, except for robots of the catalogue with invalid mimic rules.
         root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
         xacro_args: Arguments for a .xacro file, which is expanded first. Lines refer to the expanded text.
-        fold: Whether to combine many warnings of one kind into a single warning that lists the lines. If
-            there are more than a hundred errors of one kind, the last printed error lists the others.
+        fold: Whether to combine many warnings with one code into a single warning that lists the lines. If
+            `fold` is True and there are more than a hundred errors with one code, the hundredth error lists
+            the lines of the others.
 
     Returns:
-        The findings that no comment silences, as a list that displays as a table in notebooks. The list is
-        empty if the file has no problem. At most 10,000 findings of one kind are listed. The lines of all
-        further findings are in the attribute `also` of the last listed finding.
+        The findings that no comment silences, as a list. Notebooks show this list as a table. The list is
+        empty if the file has no problem. If a file has more than 10,000 findings with one code, the list
+        contains the first 10,000. The attribute `also` of the last of these findings contains the line
+        numbers of the others.
 
     Raises:
         SourceError: the file cannot be read.
@@ -87,10 +89,11 @@ class Examined:
 
     Attributes:
         text: The text.
-        data: The bytes without a byte order mark. Lines, columns and fixes refer to these bytes.
+        data: The bytes of the text without a byte order mark. The line and column numbers and the fixes of
+            the findings refer to positions in `data`.
         robot: The records of the robot; None if the text is not a URDF.
         findings: The findings by line.
-        silenced: The findings that a comment silences, each with the reason.
+        silenced: Pairs of a finding that a comment silences, and the reason in this comment.
     """
 
     text: Text
@@ -109,7 +112,7 @@ def examine(
     fold: bool = False,
     wanted: Callable[[Finding], bool] | None = None,
 ) -> Examined:
-    """Check a text that is already read.
+    """Check a text that `read_source` has returned.
 
     Args:
         text: The text.
@@ -117,7 +120,8 @@ def examine(
         mimic: As for `check`.
         root_joint: As for `check`.
         fold: As for `check`.
-        wanted: A filter, applied before findings are combined; None: all findings.
+        wanted: A function that returns whether to report a finding. It is called before urdfkin combines
+            findings. None: all findings are reported.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
@@ -144,7 +148,7 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 
     Args:
         data: The bytes.
-        limits: Limits on the size of the file.
+        limits: Limits on the size of the file, its elements, names and numbers.
         fold: As for `check`.
 
     >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
@@ -156,12 +160,13 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 
 
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
-    """Read the file of a reporter, add findings to this reporter, and return the records of the robot.
+    """Parse and check the bytes in a reporter, and return the records of the robot.
 
     Args:
-        report: The reporter with the name, the bytes and the limits of the file. The reporter receives the
-            findings.
-        mimic: Whether mimic joints follow their mimicked joints. False: problems with mimic joints are notes.
+        report: A reporter with the name, the bytes and the limits of the file. The function adds findings to
+            it.
+        mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
+            are notes.
         root_joint: `"floating"` or `"planar"` if the robot gets such a joint. The file must not contain the
             names of this additional joint and of its parent link.
 

@@ -8,12 +8,13 @@ The arguments of `urdfkin check` are files, folders or patterns. Settings are in
     baseline = "urdfkin-baseline.json"
     per-file-ignores = { "legacy/*" = ["URDF5"] }
 
-Files and patterns are relative to the folder of pyproject.toml. A finding is reported if its code is selected
-and neither the baseline nor the older version of the file contains it.
+Files and patterns are relative to the folder of pyproject.toml. urdfkin reports a finding if its code is
+selected and the finding is new. A new finding is neither in the baseline nor in the older version of the
+file.
 
-A baseline is a file of known findings. A finding is known if its file, code, severity, element, name and
-found text are in the baseline. The line number is not compared. Therefore, if you edit other lines, the
-finding is still known. If you change the found text, the finding is new.
+A baseline is a JSON file with known findings. A finding is known if an entry of the baseline has the same
+file, code, severity, element, name and found text. urdfkin does not compare the line numbers. A finding
+therefore stays known after you edit other lines. If you change the found text, the finding is new.
 """
 
 from __future__ import annotations
@@ -54,12 +55,12 @@ def key_of(finding: Finding, file: str) -> Key:
 
 @dataclass(slots=True)
 class Baseline:
-    """The number of known findings of each key.
+    """The known findings, and how many findings of this run match them.
 
     Attributes:
-        counts: For each key, the number of known findings minus the number of matching findings in this run.
-        root: The folder to which file names are relative.
-        met: The number of reported findings that matched a known finding.
+        counts: For each key: the number of known findings that no finding of this run has matched yet.
+        root: The folder to which the file names in the keys are relative.
+        met: The number of findings of this run that matched a known finding.
     """
 
     counts: Counter[Key]
@@ -67,7 +68,7 @@ class Baseline:
     met: int = 0
 
     def knows(self, finding: Finding) -> bool:
-        """Return whether a finding is known; a known finding of the baseline matches only once."""
+        """Return whether a finding is known. Each known finding matches only one finding of this run."""
         key = key_of(finding, relative(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
@@ -118,7 +119,7 @@ def read_baseline(path: Path) -> Baseline:
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
     """Return the text of a baseline file with the given findings.
 
-    If the path has an older baseline, its entries for other existing files are copied.
+    If there already is a baseline at `path`, copy its entries about other files that still exist.
 
     Args:
         findings: The findings of the checked files.
@@ -286,12 +287,13 @@ _PARTS = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The selection of the findings to report.
+    """The options of `urdfkin check` that select the reported findings.
 
     Attributes:
         codes: The selected codes.
         notes: Whether notes are reported.
-        settings: The settings, which contain the codes that are ignored in certain files.
+        settings: The settings in pyproject.toml. For example, they name codes that are ignored in certain
+            files.
         baseline: The known findings, or None. The baseline object counts the matched findings.
     """
 
@@ -303,26 +305,28 @@ class Choice:
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        Call the returned function once for each finding of the file, in the order of the findings.
+        The returned function counts the findings that match a baseline. Therefore, call it exactly once for
+        each finding of the file, in the order of the findings.
 
         Args:
             text: The file.
-            before: The findings of an older version of the file, or None.
+            before: The findings in an older version of the file, as a baseline; or None.
         """
         codes = self.codes - self.settings.ignored_in(text.label)
         known = [baseline for baseline in (self.baseline, before) if baseline is not None]
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # `any` would stop at the first baseline, but `knows` must count the finding in both baselines
+            # not `any`, which stops after the first match: each baseline must count the finding
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return the filter of the method `of` for a second check of the same file.
+        """Return the same function as `of`, but for a second check of the same file.
 
-        The filter uses copies of the baselines, so that the second check does not change their counts.
+        The returned function works on copies of the baselines, so that the second check does not change the
+        counts.
         """
         copies = [
             None if known is None else replace(known, counts=Counter(known.counts))
@@ -347,8 +351,8 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # The older xacro file cannot be expanded.
-        # If a file that it may include has changed, every finding counts as new.
+        # The older xacro file cannot be expanded. If a file that the xacro file may include has changed,
+        # urdfkin treats every finding as new.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)
@@ -369,7 +373,7 @@ def collected(word: str, settings: Settings, include: Sequence[str], exclude: Se
 
     Args:
         word: A file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[`, `**`.
-        settings: The settings; patterns are relative to the folder of the settings.
+        settings: The settings. The patterns in `exclude` are relative to the folder of these settings.
         include: Patterns of file names to select in a folder.
         exclude: Patterns of files and folders to skip. A file that the user names as the argument is not
             skipped.

@@ -1,4 +1,7 @@
-"""Check inertials, shapes, materials and meshes. Kinematics does not use them, so no finding is an error."""
+"""Check inertials, shapes, materials and meshes.
+
+No finding of these checks is an error, because kinematics does not use this content.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,8 @@ INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 #: Larger values are reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: A body with a smaller mass (kg) is a placeholder, so its moments of inertia are not checked.
+#: If the mass (kg) of a body is below this number, urdfkin treats the mass as a placeholder, and does not
+#: check the body's moments of inertia.
 NEGLIGIBLE = 1e-3
 
 #: Moments of inertia per kg (m^2) below this number count as rounding errors.
@@ -284,10 +288,10 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report each missing mesh file, and report once each package that is not found.
+    """Report each missing mesh file. If a package is not found, report it only once.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         root: The root element of the document.
         beside: The file of the URDF; None if the URDF is text. For text, urdfkin searches only for meshes
             with `package://`, in the search paths of the environment.

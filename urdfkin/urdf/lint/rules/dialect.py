@@ -196,8 +196,8 @@ _ADDED = (
 )
 EXTENSIONS = frozenset(_ADDED.split())
 
-#: Each line is `element: attributes > child elements`. If a line has no colon, the attributes of the element
-#: are not checked. Other elements are not checked.
+#: Each line has the form `element: attributes > child elements`. If a line has no colon, urdfkin does not
+#: check the attributes of the element. urdfkin does not check elements that are not in this table.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -227,7 +227,8 @@ ATTRIBUTES = {
 #: Elements and attributes of other formats for poses, which URDF readers skip.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Attributes that have a meaning on other elements or in other formats. `--fix` does not remove them.
+#: Attributes that URDF defines for other elements, or that other formats define. `--fix` does not remove
+#: them.
 _MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
 #: For each element: the child elements that may occur only once.
@@ -353,7 +354,7 @@ def _check_text(report: Reporter, element: Element) -> None:
     if not element.text or element.tag not in _VALUES | {"robot", "joint", "link"}:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
-        return  # the finding about the missing attribute quotes this text
+        return  # the finding about the missing attribute `link` already quotes this text
     lost = element.tag in _VECTORS and not element.attributes
     example = _EXAMPLES.get(element.tag)
     report.add(
@@ -397,7 +398,8 @@ UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 #: Prefixes that XML declares itself.
 _PREDECLARED = ("xml", "xmlns")
 
-#: Prefixes that the rules URDF202 and URDF112 report; the check of undeclared prefixes skips these prefixes.
+#: The rules URDF202 and URDF112 report names with these beginnings. Therefore, the check of undeclared
+#: prefixes skips them.
 _REPORTED = ("xacro:", "xi:include")
 
 
@@ -468,7 +470,7 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
     """Report names that are reserved, easily confused, or troublesome for other programs.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         robot: The records of the robot.
         root_joint: Kind of the additional joint `root_joint` whose parent is a link `universe`; None if the
             robot gets no such joint.
@@ -548,7 +550,7 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
     seen: dict[str, str] = {}
     for name, element in named:
         if name.isascii() or len(name) > LONGEST:
-            continue  # the name is already reported as too long; comparing it would be slow
+            continue  # a long name has its own finding, and is slow to compare
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
@@ -574,7 +576,7 @@ def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
 
     Args:
         report: The reporter of the file.
-        codes: For each name of a rule in lower case: the code of the rule.
+        codes: Maps each name of a rule, in lower case, to the code of the rule.
     """
     silences = Silences()
     for comment in report.comments:

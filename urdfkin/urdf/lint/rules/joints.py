@@ -130,7 +130,8 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     """Return whether exactly one link has no parent; report all further links without a parent.
 
-    A link is not reported if a joint with an error may be its parent joint.
+    If the child of a joint is missing or does not exist, the joint may be the parent joint of any link. In
+    this case no link is reported.
     """
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
@@ -141,7 +142,8 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if not children <= robot.links.keys():
         return False  # a joint with a missing or wrong child was already reported
     parents = {joint.parent for joint in robot.joints}
-    # The first root with children is the root of the robot. The other roots are disconnected from it.
+    # Of the links without a parent, urdfkin treats the first one with children as the root of the robot. It
+    # reports the others, because no joint connects them with this root.
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
@@ -160,21 +162,23 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If the length of an axis differs from 1 by less than this number, the finding is only a note.
-#: Such a small difference comes from rounding of the last digits.
+#: If the length of an axis differs from 1 by less than this number, urdfkin reports a note instead of a
+#: warning. Axes that are written with few digits have differences of this size.
 LENGTH_ROUNDING = 2e-4
 
-#: Tolerance of a unit vector's length, the same as in `kinematics.inputs`.
+#: Largest difference between 1 and the length of a unit vector. `kinematics.inputs` has the same tolerance.
 _ONE = 1e-12
 
-#: Relative tolerance within which the axis of a planar joint counts as the z axis.
+#: If the x and y components of a planar joint's axis are below this fraction of its z component, the axis is
+#: treated as the z axis.
 _LEAN = 1e-9
 
-#: Relative tolerance within which Pinocchio replaces a joint's axis by a coordinate axis.
-#: It is the default tolerance of Eigen's isApprox, which compares squares of lengths.
+#: If a joint axis differs from a coordinate axis by less than this relative tolerance, Pinocchio uses the
+#: coordinate axis. The number is the default tolerance of Eigen's function `isApprox`, which compares squared
+#: lengths.
 _SNAPPED = 1e-12
 
-#: A tilt (rad) below this number is not reported, because `verify.bounds` includes such a rounding error.
+#: A tilt (rad) below this number is not reported, because the error bounds in `verify.bounds` include it.
 _TILT = 2.0**-52
 
 
@@ -252,7 +256,7 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) between Pinocchio's axis and the file's axis for joints with finding URDF514."""
+    """For joints with finding URDF514, return the angle (rad) from the file's axis to Pinocchio's axis."""
     snapped = ((joint.name, _snap(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
     return {name: result[1] for name, result in snapped if result is not None}
 
@@ -374,8 +378,9 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest plausible multiplier and offset (rad or m) of a mimic joint. Larger values are reported.
 LARGEST = 1e6
-#: The limits of a mimic joint may exclude a part of the mimicked joint's range. If this part is smaller than
-#: this fraction, there is no finding, because limits are often written with few digits.
+#: If the limits of a mimic joint are too narrow, the mimicked joint cannot use its full range. If the
+#: unusable fraction of the range is below this number, there is no finding, because limits are often written
+#: with few digits.
 LEAST_LOST = 1e-3
 
 
@@ -383,7 +388,7 @@ def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
     """Report problems of mimic joints.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         robot: The records of the robot.
         enabled: Whether the mimic rules are used. False: every finding is a note.
     """
@@ -453,7 +458,7 @@ class _MimicChecker:
             self.check_sound(joint, mimic, leader)
 
     def unknown(self, mimic: MimicRecord) -> None:
-        """Report that the mimicked joint does not exist."""
+        """Report a mimic rule whose mimicked joint does not exist."""
         nearest = self.report.nearest(mimic.leader, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
@@ -577,24 +582,25 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
-#: A joint origin longer than this (m) is probably in millimetres.
+#: A joint origin with a coordinate of at least this length (m) is probably in millimetres.
 FAR = 100.0
 
-#: If the sum of all lengths of a robot is smaller than this (m), the robot was probably scaled twice.
+#: If the sum of all lengths of a robot is below this length (m), the lengths were probably scaled twice.
 TINY = 1e-4
 
-#: An angle that is a whole number and at least `MANY` is probably in degrees, not in radians.
-#: Some exporters write an angle of at least `ENDLESS` for a joint without limits.
+#: A limit that is a whole number, and at least `MANY`, is probably in degrees instead of radians. Limits of
+#: `ENDLESS` and more are not reported, because some exporters write them for a joint without limits.
 MANY, ENDLESS = 30.0, 1000.0
 
-#: If the rounding of a multiple of pi moves a tip by more than this (m), the finding is a warning.
+#: If an angle is a rounded multiple of pi, the rounding moves the links below the joint. If it moves a link
+#: by more than this length (m), the finding is a warning.
 NOTICEABLE = 1e-3
 
-#: If an angle differs from a multiple of pi by less than this (rad), it is not reported.
+#: An angle that differs from a multiple of pi by less than this angle (rad) is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi that are recognized in rounded numbers. The second entry is the smallest number of decimals
-#: for which the multiple is recognized.
+#: Pairs of a multiple of pi, divided by pi, and a number of decimals. urdfkin recognizes the multiple of pi
+#: in a rounded number only if the number has at least so many decimals.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -604,7 +610,7 @@ def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> No
     """Report legal values that are probably mistakes.
 
     Args:
-        report: The reporter, which receives the findings.
+        report: This object collects the findings.
         robot: The records of the robot.
         sound: Whether the joints form a tree, so that lengths along chains are defined.
     """
@@ -681,7 +687,7 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
 def _replace_words(raw: str | None, words: list[str]) -> str:
     """Replace the words in a raw attribute value, but keep the white space between the words."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
-    if len(blanks) != len(words) + 1:  # the white space in the raw value is written as character references
+    if len(blanks) != len(words) + 1:  # the raw value has white space as `&#32;`
         return " ".join(words)
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
@@ -715,7 +721,7 @@ def _as_pi(multiple: Fraction) -> str:
 def _metres(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
-    # Write two significant digits, without an exponent.
+    # Round the length to two significant digits; `:g` then writes it without an exponent.
     return f"{float(f'{length * factor:.1e}'):g} {unit}"
 
 
@@ -784,7 +790,7 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return, for each link, a bound (m) on the distance to its descendants: the sum of the lengths."""
+    """Return an upper bound (m) on the distance from each link to the links below it."""
     below: dict[str, list[JointRecord]] = {}
     for joint in robot.joints:
         below.setdefault(joint.parent or "", []).append(joint)

@@ -1,8 +1,8 @@
 """Findings of `load` about MJCF and USD: parts that a tree cannot represent, and probable mistakes.
 
-A finding contains its element: the tag and the name of an MJCF element, or the path of a prim. If the element
-is in the text of the file itself, the finding also has its line. Elements of included files and layers, of
-binary files, and beyond the first 10 MB have no line.
+A finding names an element: an MJCF element by its tag and name, or a USD prim by its path. If the element is
+in the text of the file itself, the finding also contains the line. The line is unknown if the element is in
+an included file, in another layer, in a binary file, or after the first 10 MB.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, 
 
 
 def of_usd(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, ...]:
-    """Return a finding for each remark about a USD stage; its name is the path of the prim.
+    """Return a finding for each remark about a USD stage. The name of the finding is the path of the prim.
 
     Args:
         remarks: The remarks.
@@ -108,13 +108,16 @@ def _finding(
 
 
 def _element(where: str | None) -> tuple[str | None, str | None]:
-    """Return the tag and the name of a place such as `joint elbow`."""
+    """Split a text such as `joint elbow` into the tag and the name of an element."""
     tag, _, name = (where or "").partition(" ")
     return tag or None, name or None
 
 
 def _placed(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
-    """Return the place of each element that a search finds; of several with one name, the first."""
+    """Return the position of each element that `search` finds.
+
+    Of elements with the same name, use the first.
+    """
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_SEARCHED]):
         found.setdefault((element, name), (first, last))
@@ -129,9 +132,10 @@ def _placed(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | Non
 
 
 def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
-    """Yield the tag, the name and the span of each element of an MJCF text that a finding can have.
+    """Yield the tag, the name and the span of each MJCF element to which a finding can refer.
 
-    An equality without a name has its number among all equalities, unless another file is included.
+    If an equality has no name, its number among all equalities is used instead. If the file includes other
+    files, this number is unknown, and the equality is skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
