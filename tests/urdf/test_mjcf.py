@@ -180,7 +180,7 @@ def test_a_file_with_everything_is_verified_and_says_what_it_does_not_hold(tmp_p
     assert {"world", "base", "imu", "tool"} <= set(robot.link_names)
     said = {f.sentence for f in robot.findings if f.code == "MJCF101"}
     assert {
-        "equality 'curve': a constraint (g and f) that is not linear in one other joint",
+        "equality 'curve': a constraint (g and f) that is no linear relation of two joints",
         "equality 'glue': a constraint (weld of tip and base) that a tree cannot represent",
         "tendons have no effect here",
     } <= said

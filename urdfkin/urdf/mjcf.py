@@ -580,7 +580,7 @@ class _Reader:
                 continue
             if rule is None:
                 names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
-                what = f"a constraint ({names}) that is not linear in one other joint"
+                what = f"a constraint ({names}) that is no linear relation of two joints"
             elif rule[0] in rules or _leads(rules, rule[1].leader, rule[0]):
                 what = f"joint {rule[0]} has two rules, or its rules form a circle"
             else:

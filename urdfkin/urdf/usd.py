@@ -979,7 +979,7 @@ class _Reader:
         for group in groups:
             if len(groups) > 1 and self._root(group) is not None:
                 raise InputError(
-                    "this articulation is not attached to the world, so it has no place beside the others",
+                    "this articulation is not attached to the world, so it cannot be joined with others",
                     where=f"{self.source}: {group.path}",
                     remedy="choose one articulation",
                 )
@@ -1147,7 +1147,7 @@ class _Reader:
                 self._say(
                     "unused-in-usd",
                     edge.path,
-                    "a limit on one side only: the URDF, which has no such limit, has none",
+                    "a lower limit without an upper one, or the reverse; a URDF has both or none, so it has none",
                 )
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
@@ -1215,7 +1215,7 @@ class _Reader:
                     self._say(
                         "lost-mimic",
                         edge.path,
-                        f"this joint mimics {rule[0] or 'nothing'}, not a joint with one coordinate here",
+                        f"this joint mimics {rule[0] or 'nothing'}, which is no joint with one coordinate",
                         "correct the relationship",
                     )
                 elif edge.path in rules or _leads(rules, rule[0], edge.path):
@@ -1269,7 +1269,7 @@ class _Reader:
             self._say(
                 "lost-mimic",
                 edge.path,
-                "the schema has no unit for a coefficient between angle and length; m and rad are used",
+                "a mimic rule between an angle and a length has no unit in the schema; m and rad are used",
                 "compare the joint with the simulator",
             )
         return 1.0

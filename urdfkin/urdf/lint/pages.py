@@ -161,7 +161,8 @@ def explain(rule: Rule) -> str:
     if rule.oracle is not None:
         paragraphs.append(
             textwrap.fill(
-                "Because of this, urdfkin computes the robot and reports every result as not verified.", WIDTH
+                "Pinocchio cannot check such a robot. urdfkin reports its results as not verified.",
+                WIDTH,
             )
         )
     if content.question is not None:

@@ -53,7 +53,7 @@ CASES = [
     Mjcf(
         "a-curve-between-two-joints",
         _held('<joint name="bent" joint1="b" joint2="a" polycoef="0 0 1 0 0"/>'),
-        "MJCF101 equality bent: a constraint (b and a) that is not linear in one other joint",
+        "MJCF101 equality bent: a constraint (b and a) that is no linear relation of two joints",
     ),
     Mjcf(
         "a-joint-held-twice",
