@@ -204,10 +204,10 @@ def study_parts(judgements: dict[str, Judgement]) -> dict[str, str]:
     lines = [line for judgement in judgements.values() for line in plain(judgement)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
-By the typical error
+The typical errors are compared in each line of the tables:
 {nearer_counts(lines)}. Equal errors are
-the same double. The ratio of the typical errors, urdfkin's divided by Pinocchio's, has the median
-{median(ratios):.2f}. It lies between {min(ratios):.2f} and {max(ratios):.2f}."""
+the same double. The median ratio of urdfkin's typical error to Pinocchio's is
+{median(ratios):.2f}. The ratios lie between {min(ratios):.2f} and {max(ratios):.2f}."""
     sections = [f"## {name}\n\n{_errors(judgement.lines)}" for name, judgement in judgements.items()]
     return {"counts": counts, "tables": "\n\n".join(sections)}
 

@@ -194,7 +194,7 @@ class Table(TypedDict):
 
 
 class Chain(TypedDict):
-    """A chain of the robot and its tables."""
+    """A chain of the robot, with its Denavit-Hartenberg tables."""
 
     limb: Annotated[str | None, says("Name of the limb in the catalogue; null: none.")]
     base: Annotated[str, says("Name of the chain's base frame.")]
@@ -262,7 +262,7 @@ class Judgement(TypedDict):
 
 
 class Case(TypedDict):
-    """The sample with the largest ratio of disagreement to bound."""
+    """The sample at which the disagreement is the largest fraction of its bound."""
 
     sample: Annotated[
         Count,
@@ -280,7 +280,7 @@ class Case(TypedDict):
 
 
 class Pair(TypedDict):
-    """Comparison of one library with a second oracle."""
+    """Comparison of urdfkin or Pinocchio with the second oracle."""
 
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     worst: Units
@@ -294,7 +294,7 @@ class Pair(TypedDict):
 
 
 class Alone(TypedDict):
-    """For each of three libraries: the number of results in which it differs and the other two agree."""
+    """Number of results in which one library differs and the other two agree, for each of three libraries."""
 
     urdfkin: Annotated[Count, says("Number of results in which only urdfkin differs.")]
     pinocchio: Annotated[Count, says("Number of results in which only Pinocchio differs.")]
@@ -302,7 +302,7 @@ class Alone(TypedDict):
 
 
 class SecondOracle(TypedDict):
-    """Comparison of the same results with a second oracle; the entry is missing without a second oracle."""
+    """Comparison of the same results with a second oracle. Without a second oracle, this entry is missing."""
 
     by: Annotated[str, says("Name of the second oracle: mujoco.")]
     urdfkin: Pair
@@ -355,7 +355,9 @@ class Check(TypedDict):
     worst_by_subject: Annotated[list[Units], says("The largest disagreement of each frame, joint or column.")]
     worst_case: Annotated[
         Case | None,
-        says("The sample with the largest ratio of disagreement to bound; null if nothing was compared."),
+        says(
+            "The sample at which the disagreement is the largest fraction of its bound; null: no comparison."
+        ),
     ]
     second_oracle: NotRequired[SecondOracle]
 
