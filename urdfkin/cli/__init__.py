@@ -162,7 +162,7 @@ _SYNONYMS = {
     **dict.fromkeys(("equal", "equivalent"), "same"),
     **dict.fromkeys(("list", "catalogue", "catalog"), "robots"),
 }
-#: For each word about a subject that urdfkin does not support: the commands with the most similar purpose.
+#: For each word about a subject that urdfkin does not support: the advice in the error message.
 _ABSENT = {
     **dict.fromkeys(
         ("ik", "inverse", "inverse-kinematics", "solve"),

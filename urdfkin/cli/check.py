@@ -280,7 +280,7 @@ limit_options = together(
     is_flag=True,
     help="Print each finding on its own line. Default: one line for many findings of one kind.",
 )
-@mimic_option("Check the file for coupled (--mimic) or free (--no-mimic) mimic joints.  [default: mimic]")
+@mimic_option("Check with mimic joints coupled (--mimic) or as free joints (--no-mimic).  [default: mimic]")
 @root_joint_option("Also check that no name of the robot collides with this root joint.")
 @source_options
 @settings_options
@@ -289,7 +289,7 @@ limit_options = together(
 def command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
     """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
-    A FILE is a path, also of a USD or MJCF file, a name from `urdfkin robots`, or - for standard input. A
+    A FILE is the path of a URDF, USD or MJCF file, a name from `urdfkin robots`, or - for standard input. A
     FOLDER means all *.urdf files in it. Without FILE and FOLDER, the current folder is checked. A .xacro file
     is expanded in a restricted process that can only compute and read the files of its package
     (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request. Settings are in
@@ -459,7 +459,7 @@ class Run:
     def _check_other(self, file: str) -> None:
         """Check a USD or MJCF file.
 
-        If the robot is invalid, convert it to URDF and add the findings about the URDF.
+        If `load` rejects the robot, add the findings of its error.
 
         With --changed-since, an unchanged file is skipped, and all findings of a changed file are reported.
         """
@@ -524,7 +524,7 @@ class Run:
         return mended.text
 
     def _safe(self, chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
-        """Restrict a selection of findings to those with a fix that may be applied."""
+        """Return a filter that also rejects findings with an unsafe fix, unless --unsafe-fixes is given."""
         return lambda finding: chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
 
     def _with_severity(self, finding: Finding) -> Finding:
@@ -552,7 +552,7 @@ def _is_other(file: str) -> bool:
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
             return False  # without the next import, which loads NumPy
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a check of a URDF does not need this slow import
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  slow, and not needed for a URDF
 
     return is_mjcf(file)
 

@@ -100,7 +100,7 @@ choice_options = together(
     _choice(
         "--sign",
         ("theta", "a", "alpha"),
-        "Choice of the direction of x: smallest theta, a not negative, or alpha not negative.",
+        "Choose the direction of the x axes so that |theta| is smallest, or that a or alpha is not negative.",
     ),
     _choice(
         "--slide",
@@ -199,11 +199,11 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 def command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
-    The path may lead down the tree, up, or through the common ancestor. The table has the file's angles and
-    lengths, without rounding. --snap rounds angles, and prints a bound on the displacement of the tip. ROBOT
-    is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv, .tsv,
-    .md, .tex, .txt). If ROBOT is a table, the command writes the same table in the chosen convention. With
-    --base, --tip, --snap or other options that affect the rows, the command derives a new table from the
+    The path may go down or up the tree of links, or first up and then down. The table has the file's angles
+    and lengths, without rounding. --snap rounds angles, and prints a bound on the displacement of the tip.
+    ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
+    .tsv, .md, .tex, .txt). If ROBOT is a table, the command writes the same table in the chosen convention.
+    With --base, --tip, --snap or other options that affect the rows, the command derives a new table from the
     robot that the table describes. See `urdfkin explain urdf-to-dh`.
 
     Exit 0: verified, or the compared table agrees. 1: the compared table differs, or agrees only because

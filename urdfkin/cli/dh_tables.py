@@ -40,7 +40,8 @@ from urdfkin.verify.verifier import TABLE_SAMPLES
 
 #: Formats that can contain several tables.
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: In these formats, the check's result is printed below the table. With other formats, it goes to stderr.
+#: In these formats, the check's result is printed below the table. With other formats, the result of the
+#: check goes to stderr.
 _PRINTED = ("terminal", "markdown")
 #: Formats for people. All other formats are for data and code.
 _TEXTS = (*_PRINTED, "html", "latex")
@@ -260,7 +261,7 @@ def _compare(work: Work, name: str) -> Answer:
 
 
 def _frame_of_robot(work: Work, name: object) -> str | None:
-    """Return the name of a table's base or tip frame if the robot has a frame of that name."""
+    """Return `name` if it is the name of a frame of the robot; otherwise None."""
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
 

@@ -77,10 +77,10 @@ def command(
     """Write a frame's kinematics as code without loops, for one robot, with test vectors in the file.
 
     The robot's constants are part of the code, and each joint's sine and cosine are computed once. The
-    expressions are compared with Pinocchio before they are written. The file states how closely they agree.
-    The file also contains test vectors with true values at fifty digits. --check compiles or imports a file
-    and runs its test vectors. You can also run the test vectors without urdfkin. ROBOT is a path, a name that
-    `urdfkin robots` lists, or - for standard input.
+    expressions are compared with Pinocchio before they are written. The file states how closely the
+    expressions agree with Pinocchio. The file also contains test vectors with true values at fifty digits.
+    --check compiles or imports a file and runs its test vectors. You can also run the test vectors without
+    urdfkin. ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
 
     Exit 0: verified. 1: Pinocchio or a test vector disagrees. 2: bad input, or the file does not run here.
     3: not verified, or changed after it was written.

@@ -42,7 +42,8 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--within",
     type=NumberFrom(0.0),
-    help="Exit 0 only if it is proven that no frame of B is farther than this (m and rad) from A's.",
+    help="Exit 0 only if urdfkin proves that no frame of B is farther than this (m and rad) from the same"
+    " frame of A.",
 )
 @click.option(
     "--boxes",
@@ -81,7 +82,7 @@ def same_command(
     schema: bool,
     **paths: Path | None,
 ) -> Answer:
-    """Prove whether A and B are the same robot in every configuration; with C, all pairs of them.
+    """Prove whether A and B are the same robot in every configuration; with C, compare each pair.
 
     A and B are robots as in other commands, or Denavit-Hartenberg tables. A and B are the same robot if the
     screws of all joints and the zero-configuration poses of all links agree. Fixed links, names and the order

@@ -192,7 +192,7 @@ def _remember_articulation(context: click.Context, _: click.Parameter, word: str
 
 
 def how_to_load() -> dict[str, Any]:
-    """Return the running command's options for `load`: its arguments from `mimic` to `articulation`."""
+    """Return the options of the running command that are arguments of `load`, for example `mimic`."""
     return dict(click.get_current_context().meta.get(_HOW, {}))
 
 

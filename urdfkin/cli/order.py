@@ -54,7 +54,7 @@ def _table(robot: Robot) -> Answer:
         heads = ("joint", *(first for first, *_ in groups.values()))
         rows = list(zip(robot.joint_names, *groups, strict=True))
         also = [f"{first}: also {', '.join(others)}" for first, *others in groups.values() if others]
-        title = f"{robot.name}: index of each joint in q, or its indices in q and v as q/v if they differ"
+        title = f"{robot.name}: index of each joint in q, or q/v if its index in v differs"
         return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
 
     def lines() -> Iterator[list[object]]:

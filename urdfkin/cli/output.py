@@ -190,7 +190,7 @@ def compiling() -> Iterator[None]:
 def console(*, err: bool = False) -> Console:
     """Return a console with the width of the terminal.
 
-    In a pipe, COLUMNS sets the width; without it, nothing wraps.
+    If the output goes to a pipe, the variable COLUMNS sets the width. Without COLUMNS, no line is wrapped.
     """
     from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  keeps --help fast
 

@@ -183,8 +183,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
         "--opw",
         type=Number(),
         metavar="MM",
-        help="Print parameters for OPW solvers as YAML; it is an error if the tip deviates by more than MM"
-        " (mm and mrad).",
+        help="Print the parameters of an OPW solver as YAML. Fail if the tip deviates by more than MM (mm and"
+        " mrad).",
     ),
     answers=answering(*TEXTS, "json"),
 )

@@ -107,7 +107,8 @@ def command(
     acceleration. Other panels show the parts of the acceleration, the singular values, and the result of the
     check. Each axis has one unit. --trajectory reads a CSV or .npz file. --to makes a line in joint space
     that begins and ends at rest. A floating base moves along a screw. With --convention, the file and the
-    values of --from and --to are in that convention. The panels show the numbers of the URDF, in rad and m.
+    values of --from and --to are in that convention. The panels show the joint values of the URDF, in rad and
+    m, also with --convention.
 
     Exit 0: verified. 1: a disagreement. 3: Pinocchio could not check it.
     """

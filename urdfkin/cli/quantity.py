@@ -311,7 +311,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
     from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
 
     def parts() -> Iterator[str | Table]:
-        yield "m/s^2 and rad/s^2; transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z (7.125)"
+        yield "m/s^2, rad/s^2; terms (7.125): transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z"
         heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
         for k, heading in _samples(x, 2, "csv, json or npy"):
             yield from heading
@@ -387,15 +387,16 @@ _FORMS = {
         type=click.Choice(["matrix", *_FORMS]),
         default="matrix",
         show_default=True,
-        help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
+        help="How to print the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
         " quaternion: x, y, z, qx, qy, qz, qw. wxyz: x, y, z, qw, qx, qy, qz.",
     ),
 )
 def placement_command(relative_to: str | None, written: str, verify: bool, **_: Any) -> Answer:
     """Compute the pose of a frame (eq. 7.77) in the world or in another frame, in metres.
 
-    The pose is a matrix T with the frame's axes and origin, or, with --as, six or seven numbers. Pinocchio
-    checks that these numbers give the same rotation.
+    The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position and three
+    angles, or a position and a quaternion. Pinocchio checks that the angles or the quaternion give the same
+    rotation as T.
 
     ROBOT is a path, a name from `urdfkin robots`, or - for standard input. ROBOT can also be the file of a
     Denavit-Hartenberg table (.toml, .json or .csv).
@@ -462,8 +463,8 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
         metavar="NAME",
         default="ZYZ",
         show_default=True,
-        help="rpy (roll, pitch, yaw as in a URDF), quaternion, or Euler angles by their axes: capitals are"
-        " moving axes (ZYZ), small letters fixed axes (xyz is rpy).",
+        help="rpy (roll, pitch, yaw as in a URDF), quaternion, or the axes of three Euler angles: capital"
+        " letters for moving axes (ZYZ), small letters for fixed axes (xyz, which is rpy).",
     ),
     click.option(
         "--nearest",
@@ -564,8 +565,8 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     a configuration, the manipulability may have no derivative. A missing derivative is nan in CSV and null in
     JSON. See `urdfkin explain singularity`.
 
-    With --convention, the derivatives are for the tool's joint velocities. The singular values are always for
-    joint velocities in rad/s and m/s.
+    With --convention, the derivatives are with respect to the joint coordinates of that convention. The
+    singular values are always for joint velocities in rad/s and m/s.
     """
     x = _read()
     with compiling():

@@ -129,10 +129,10 @@ def show(
 ) -> None:
     """Show a report or convert it to HTML, JUnit or Markdown.
 
-    RESULTS can be a store at any time, also during a validation. An incomplete store is shown as an
-    interrupted run.
+    RESULTS can be the folder of --store, even while the validation runs. If robots are still missing in this
+    folder, the command shows the run as interrupted.
 
-    The exit status is the exit status of the run. 0: everything verified. 1: a disagreement. 2: a robot could
+    The exit code is that of the validation. 0: everything verified. 1: a disagreement. 2: a robot could
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415

@@ -74,10 +74,10 @@ _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
-    Joints are in the order of q, of v and of a Jacobian's columns, which is Pinocchio's order. If the joints
-    have another order in the file, the command reports it. Limits are in rad and rad/s; those of prismatic
-    joints are in m and m/s. A link that is not indented is a child of the link above it. If a link has
-    several children, lines lead to them.
+    The joints have the same order as in q, in v and in the columns of a Jacobian. This order is Pinocchio's.
+    If the joints have another order in the file, the command reports it. Limits are in rad and rad/s; those
+    of prismatic joints are in m and m/s. A link that is not indented is a child of the link above it. If a
+    link has several children, lines lead to them.
     """
     loaded = load_robot(robot)
     data = {"json": lambda: _describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}

@@ -96,7 +96,7 @@ def _with_errors(stream: Any, descriptor: int) -> Any:
 
 
 def _occupy_closed() -> None:
-    """Open the null device for each closed stream; otherwise the next opened file would get its descriptor.
+    """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
 
     If standard input was closed, reading from it fails. If standard output was closed, writing to it fails.
     If standard error was closed, text written to it is lost.

@@ -229,8 +229,8 @@ def command(
 ) -> None:
     """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
 
-    Compared: {compared}. Not compared: {not_compared}. The library and the commands check these quantities
-    in each call.
+    Compared: {compared}. Not compared: {not_compared}. For quantities that are not compared here, urdfkin
+    checks each result when it computes the result.
 
     Configurations are random within the joint limits. The command adds the neutral configuration, and the
     configurations in which all joints are at their lower or upper limits. In every eighth sample, joint

@@ -25,7 +25,7 @@ EXAMPLE = "urdfkin vectors write vectors ur5 panda"
 def vectors_command() -> None:
     """Write test vectors for other programs.
 
-    A library of any language compares its own results with them. docs/vectors.md explains how.
+    A library in any language compares its own results with these test vectors. docs/vectors.md explains how.
     """
 
 

@@ -61,8 +61,12 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     help="Multiply the bound by this factor, for a function that rounds more often than the textbook's"
     " recursion.",
 )
-@click.option("--batch", is_flag=True, help="The function takes q (n, nq) and returns n results.")
-@click.option("--program", is_flag=True, help="TARGET is the command of a program that answers JSON lines.")
+@click.option(
+    "--batch", is_flag=True, help="Call the function with many configurations at once: q is an array (n, nq)."
+)
+@click.option(
+    "--program", is_flag=True, help="TARGET is the command of a program that reads and writes lines of JSON."
+)
 @click.option(
     "--timeout",
     type=NumberFrom(min=0, max=86400, min_open=True),
