@@ -116,10 +116,10 @@ def command(
     configurations. ROBOT may also be the file of a Denavit-Hartenberg table; the numbers of the table are
     then fitted. Without --poses and --ur, the command lists which parameters are identifiable in principle.
 
-    The command refuses a calibration that is not plausible, and prints the likeliest cause. For example, the
-    joint angles are in degrees, each pose is in the line of another configuration, or the sign of a joint is
-    wrong. With --force, the command writes the calibration nevertheless. If the joint values look like
-    degrees, --radians is also needed.
+    The command refuses a calibration that is not plausible, and prints the likeliest cause. Examples of
+    causes: joint angles are in degrees, the sign of a joint is wrong, or each pose stands in the line of
+    another configuration. With --force, the command writes the calibration nevertheless. If the joint values
+    look like degrees, --radians is also needed.
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """

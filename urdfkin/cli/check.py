@@ -491,9 +491,9 @@ class Run:
     def _is_unchanged(self, file: str, parts: tuple[str, ...], version: Version) -> bool:
         """Return whether a file, and every file that it may refer to, is the same as in an older version.
 
-        The files to which the file refers are not known here. The method therefore returns True only if no
-        file of the repository with one of the suffixes in `parts` has changed, and if the file does not
-        mention a deleted file.
+        The files to which the file refers are not known here. If any file with a suffix in `parts` has
+        changed in the repository, the method therefore returns False. It also returns False if the file
+        mentions a deleted file.
         """
         if parts not in self._changed:
             self._changed[parts] = version.changed(parts)

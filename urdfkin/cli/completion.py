@@ -1,8 +1,8 @@
 """Shell completion of commands, options, robots, files, frames, tables, codes and equations.
 
 Completion runs at each press of the Tab key, so it imports nothing heavy and reads only the names in a file.
-A name with characters that a shell interprets, such as `$(...)`, is not offered: the name may come from a
-malicious file, and the shell would run it as a command.
+Completion does not offer names with characters that a shell interprets, such as `$(...)`. Such a name in a
+malicious file could make the shell run a command.
 """
 
 from __future__ import annotations

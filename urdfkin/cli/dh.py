@@ -203,12 +203,12 @@ def command(robot: str, verify: bool, **options: Any) -> Answer:
     and lengths, without rounding. --snap rounds angles, and prints a bound on the displacement of the tip.
     ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
     .tsv, .md, .tex, .txt). If ROBOT is a table, the command writes the same table in the chosen convention.
-    With --base, --tip, --snap or other options that affect the rows, the command derives a new table from the
-    robot that the table describes. See `urdfkin explain urdf-to-dh`.
+    With an option that affects the rows, such as --tip or --snap, the command derives a new table of the same
+    robot. See `urdfkin explain urdf-to-dh`.
 
-    Exit 0: verified, or the compared table agrees. 1: the compared table differs, or agrees only because
-    base, tool and zeros absorb a mistake, which is printed. 2: bad input. 3: not checked, or a strict table
-    that loses more to rounding than the robot itself.
+    Exit 0: verified, or the compared table agrees. 1: the compared table differs, or a mistake in the table
+    is hidden by the fitted base, tool and joint offsets. 2: bad input. 3: not checked, or the rounding error
+    of a strict table is larger than that of the robot.
     """
     from urdfkin.cli.dh_tables import Work, run  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415

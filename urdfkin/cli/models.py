@@ -86,12 +86,12 @@ def same_command(
 
     A and B are robots as in other commands, or Denavit-Hartenberg tables. A and B are the same robot if the
     screws of all joints and the zero-configuration poses of all links agree. Fixed links, names and the order
-    of joints may differ. A and B are equivalent if they agree after a change of B, for example of its base
-    pose, or of the zero position or sign of a joint. If A and B differ, the command prints two bounds on the
-    largest distance of each frame of B from the same frame of A. The distance reaches the lower bound in a
-    configuration that the command prints. It is proven that no configuration within the joint limits exceeds
-    the upper bound. The numbers of a USD file have single precision. Two models are the same up to single
-    precision if every joint differs only by the rounding of its own numbers.
+    of joints may differ. A and B are equivalent if they agree after a change of B. Examples of such changes
+    are another base pose, or another zero position of a joint. If A and B differ, the command prints two
+    bounds on the largest distance of each frame of B from the same frame of A. The distance reaches the lower
+    bound in a configuration that the command prints. It is proven that no configuration within the joint
+    limits exceeds the upper bound. The numbers of a USD file have single precision. Two models are the same
+    up to single precision if every joint differs only by the rounding of its own numbers.
 
     Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
     --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are

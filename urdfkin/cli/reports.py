@@ -178,12 +178,12 @@ def show(
 def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) -> Answer:
     """Compare two reports: versions, robots, verdicts and disagreements.
 
-    A regression is one of these: the run passed before and fails now; a robot is missing, or its verdict is
-    worse; more results lie outside their bound; something is no longer compared, or on fewer samples; a bound
-    is wider; a worst disagreement grew by more than the factor and is above 2 eps*scale. A changed model is
-    listed joint by joint. A changed model alone is not a regression; `same` and `diff` compute how far its
-    frames move. If a report contradicts itself, for example in its numbers of samples, the command exits with
-    2.
+    Each of these changes is a regression. The run passed before and fails now. A robot is missing, or its
+    verdict is worse. More results lie outside their bound. A quantity is no longer compared, or it is
+    compared on fewer samples. A bound is wider. A worst disagreement grew by more than the factor and is
+    above 2 eps*scale. A changed model is listed joint by joint. A changed model alone is not a regression;
+    `same` and `diff` compute how far its frames move. If a report contradicts itself, for example in its
+    numbers of samples, the command exits with 2.
     Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
     """
     from urdfkin.report.compare import compare, document, markdown_of  # noqa: PLC0415

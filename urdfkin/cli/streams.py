@@ -1,13 +1,13 @@
 """Safe standard streams: robust against stream failures, and against control characters in names.
 
-A shell can close standard output. A shell can also connect standard output to a file on a full disk, or to a
-program that exits before it has read all of the output. The encoding of standard output may not support every
-character of a joint's name. This module handles all these failures without a traceback.
+A shell can close standard output. Standard output can be a file on a full disk, or a pipe to a program that
+exits early. The encoding of standard output may not support every character of a joint's name. This module
+handles all these failures without a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
 commands of CI services. All output passes through this stream, also the output of click and Python. A
-`SafeStream` does not escape line feeds: a line feed in its text may end a line, or may be part of a joint's
-name. Line feeds in names are escaped earlier, by the function `say` and the class `Terminal`.
+`SafeStream` does not escape line feeds, because most line feeds end a line of output. Line feeds in names are
+escaped earlier, by the function `say` and the class `Terminal`.
 """
 
 from __future__ import annotations

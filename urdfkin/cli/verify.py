@@ -101,12 +101,12 @@ def verify_command(
 
     TARGET is FILE.py:FUNCTION. If TARGET is FILE.py, the command checks each function of the file whose name
     contains a quantity, for example `jacobian`. The arguments of a function are the arrays q (nq,), v (nv,)
-    and a (nv,), as far as the quantity needs them, in rad, m and seconds. The function returns an array.
-    --program checks a program in any language: the program reads lines of JSON and answers each line with a
-    line {"result": [...]}. The file and the program run with your rights.
+    and a (nv,), in rad, m and seconds. A function for a pose or a Jacobian has only the argument q. The
+    function returns an array. --program checks a program in any language: the program reads lines of JSON and
+    answers each line with a line {"result": [...]}. The file and the program run with your rights.
 
     The command calls the function in the zero configuration, at the joint limits, and in random
-    configurations. If a usual mistake explains wrong results, the command names the mistake: for example, a
+    configurations. If a usual mistake explains wrong results, the command names the mistake. Examples are a
     wrong frame, reference frame, joint order, sign or unit, or a missing term. Exit code 0: all results
     agree; 1: they do not; 3: no oracle can check the robot.
     """
