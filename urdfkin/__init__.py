@@ -69,8 +69,8 @@ _HOMES = {
     "verify_function": "urdfkin.validation.functions",
 }
 
-# Methods call these functions, which are in packages that come later in the order of docs/architecture.md.
-# A package cannot import from a package that comes later.
+# docs/architecture.md lists the packages in an order. A package imports only from packages that are earlier
+# in this list. Some methods call functions of later packages: these functions are registered here.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
 register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))

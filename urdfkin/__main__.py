@@ -3,8 +3,8 @@
 import os
 import sys
 
-# Python puts the current folder first on sys.path. Remove it, unless urdfkin itself is in that folder.
-# Do not use pathlib here: the current folder may contain a module of that name.
+# Python puts the current folder first on sys.path. Remove this folder from sys.path, unless it contains
+# urdfkin. Do not use pathlib here: the current folder may contain a file pathlib.py.
 _home = os.path.realpath(f"{__file__}/../..")
 if not sys.flags.safe_path and os.path.realpath(sys.path[0]) != _home:
     del sys.path[0]

@@ -514,7 +514,10 @@ def test_a_patch_that_is_printed_below_the_top_of_a_repository_is_applied_there(
 def test_fixes_that_turn_a_joint_wait_for_unsafe_fixes(here: Path) -> None:
     text = LONG.replace("<axis", '<origin rpy="1.5708 0 0"/><axis')
     arm = put("arm.urdf", text)
-    assert "--unsafe-fixes also fixes 1 finding, but rotates joints by more than rounding" in check().text
+    assert (
+        "--unsafe-fixes also fixes 1 finding, but rotates joints by more than a rounding error"
+        in check().text
+    )
     done = check("--diff")
     assert done.err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
     check("--fix")

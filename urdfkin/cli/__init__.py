@@ -23,9 +23,10 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: The commands under each heading of the help page: the module of each command, and a summary of one line. If
-#: a module has one command, the function is called `command`. If it has several, the functions are called
-#: `NAME_command`. Under the heading `_COMPUTE`, the quantities of `verify/quantities.py` come first.
+#: The commands under each heading of the help page: the module of each command, and a summary of one line. In
+#: a module with one command, the command's function is called `command`. In a module with several commands,
+#: the function of the command NAME is called `NAME_command`. `groups` adds the commands of
+#: `verify/quantities.py`, for example `jacobian`, at the top of the heading `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -59,7 +60,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "dh": ("urdfkin.cli.dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
         "screws": (
             "urdfkin.cli.paths",
-            "Derive the product of exponentials of a path: zero pose and joint screws.",
+            "Compute the product of exponentials of a path: the pose at q = 0, and the joints' screws.",
         ),
         "chain": ("urdfkin.cli.paths", "Show the joint axes on the path between two frames."),
         "structure": (
@@ -92,7 +93,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         ),
         "verify": (
             "urdfkin.cli.verify",
-            "Compare your function or program with the same numbers, within the same bounds.",
+            "Compare the results of your function or program with urdfkin's and Pinocchio's.",
         ),
         "readers": (
             "urdfkin.cli.readers",
@@ -116,7 +117,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "warm": ("urdfkin.cli.warm", "Compile all kernels in advance, for container images and CI."),
     },
 }
-#: The module that makes a command from a row of the table of quantities.
+#: The module that makes a command for each quantity in `verify/quantities.py`, for example `jacobian`.
 _QUANTITY = "urdfkin.cli.quantity"
 
 
@@ -131,8 +132,8 @@ def commands() -> dict[str, tuple[str, str]]:
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
-#: For each word that users may type instead of a command: the right command.
-#: A value with options, such as "placement --relative-to FRAME", is only printed as a suggestion.
+#: For each word that users may type instead of a command: the right command. If the value contains options,
+#: as in "placement --relative-to FRAME", the error message suggests the value.
 _SYNONYMS = {
     **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
     **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),
@@ -161,7 +162,7 @@ _SYNONYMS = {
     **dict.fromkeys(("equal", "equivalent"), "same"),
     **dict.fromkeys(("list", "catalogue", "catalog"), "robots"),
 }
-#: For each word about a subject that urdfkin does not support: the commands with the most similar purpose.
+#: For each word about a subject that urdfkin does not support: the advice in the error message.
 _ABSENT = {
     **dict.fromkeys(
         ("ik", "inverse", "inverse-kinematics", "solve"),
@@ -245,7 +246,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version  # noqa: PLC0415
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
-    pinocchio()  # raises an error with the cause and the remedy if Pinocchio is missing
+    pinocchio()  # raises an error with the remedy if Pinocchio is not installed
     ctx.exit()
 
 
@@ -272,10 +273,11 @@ def main() -> None:
     """
     streams.prepare()
     guard()
-    # For small matrices, one thread of OpenBLAS is fastest. OpenBLAS reads this variable when it is imported.
+    # For small matrices, one thread of OpenBLAS is fastest. OpenBLAS reads the number of threads when NumPy
+    # imports it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if os.environ.get("_URDFKIN_COMPLETE"):  # print no error during shell completion
         sys.stderr = io.StringIO()
-    # The line below a result already states that it was not verified, and why.
+    # Hide this warning: the last line of the output already states that the result was not verified, and why.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

@@ -113,13 +113,13 @@ def command(
     """Fit the parameters of ROBOT to measured poses, and write them back into its own file.
 
     In the written URDF, only the fitted numbers are changed. Pinocchio checks this URDF at the measured
-    configurations.
-    ROBOT may also be the file of a Denavit-Hartenberg table; then its cells are fitted. Without --poses
-    and --ur, the command lists which parameters are identifiable in principle.
+    configurations. ROBOT may also be the file of a Denavit-Hartenberg table; the numbers of the table are
+    then fitted. Without --poses and --ur, the command lists which parameters are identifiable in principle.
 
-    A calibration that is not plausible is refused with the likeliest reason: joint angles in degrees, rows of
-    q shifted against the poses, or the sign of a joint. A refused calibration is written only with --force.
-    If values look like degrees, --radians is also needed.
+    The command refuses a calibration that is not plausible, and prints the likeliest cause. Examples of
+    causes: joint angles are in degrees, the sign of a joint is wrong, or each pose stands in the line of
+    another configuration. With --force, the command writes the calibration nevertheless. If the joint values
+    look like degrees, --radians is also needed.
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
@@ -146,7 +146,7 @@ def command(
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(sheet.title, parts)
-        # The line about the check is not part of the data.
+        # The JSON output does not contain the line `check`.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).put(format_, _FORMS)
         context.exit(code)
 
@@ -247,7 +247,7 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 
 def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
-    """Apply a factory calibration, and print how much the order of its rotations matters."""
+    """Apply a factory calibration. Print how far the tool's poses with the two values of --order differ."""
     from urdfkin.calibration.universal_robots import (  # noqa: PLC0415
         ORDERS,
         distance,
@@ -258,9 +258,8 @@ def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
     say(
-        f"using --order {order}; the pose of the tool differs by up to {length(metres)} and"
-        f" {angle(radians)} between "
-        "--order driver and --order urdf (docs/calibration.md)",
+        f"using --order {order}; with the other order, the pose of the tool differs by up to"
+        f" {length(metres)} and {angle(radians)} (docs/calibration.md)",
         err=True,
     )
     return universal_robots(robot, path, order)

@@ -27,17 +27,17 @@ _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Speed in chunks per second and remaining time, measured with a monotonic clock.
+    """Estimate of the speed of a validation, in chunks of samples per second, and of the remaining time.
 
-    The clock starts shortly before the first chunk is finished. The time for compiling kernels is thus not
-    counted.
+    The time until the first chunk of samples is finished is excluded, because urdfkin may compile kernels in
+    that time.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
     def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
-        """Return the chunks per second and the remaining seconds; None before the first chunk is computed."""
+        """Return the chunks per second and the remaining seconds; None until one chunk is finished."""
         seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_kept
         if fresh <= 0:
             self._begin = self._now()
@@ -49,7 +49,7 @@ class Pace:
 
 @contextmanager
 def progress(*, as_json: bool) -> Iterator[Progress]:
-    """Yield the progress callback for `validate`: JSON lines, a bar on a terminal, or plain lines."""
+    """Yield the callback with which `validate` prints JSON lines, a progress bar, or lines of text."""
     pace = Pace()
     if as_json:
         with _at_intervals(_JSON, lambda state: _json(state, pace)) as tell:
@@ -102,7 +102,7 @@ def _failures(state: CampaignProgress) -> str:
 
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    """Show the progress every `seconds` seconds. With JSON, also show it at the start and at the end."""
+    """Show the progress every `seconds` seconds; as JSON, also show the first and the last state."""
     shown, last = time.monotonic(), None
     first = seconds == _JSON
 
@@ -153,8 +153,8 @@ def _bar(pace: Pace) -> Iterator[Progress]:
 
 
 EXAMPLE = "urdfkin report status nightly"
-#: `_NAMED`: the largest number of failed robots in the output. `_READ`: the number of chunks in the mean
-#: time.
+#: `status` lists at most `_NAMED` failed robots. It estimates the time for a chunk of samples from the times
+#: of up to `_READ` finished chunks.
 _NAMED, _READ = 20, 200
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -168,7 +168,8 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 def status(context: click.Context, folder: Path) -> None:
     """Show the finished and failed robots, and an estimate of the remaining time.
 
-    Reads mainly the file names, so it is fast and does not disturb a running validation. `urdfkin report DIR`
+    The command reads only few of the files in DIR, so it is fast and does not disturb a running validation.
+    `urdfkin report DIR`
     reads and checks all files. Exit 0: complete. 3: something is missing or failed.
     """
     from urdfkin.validation.store import Store  # noqa: PLC0415
@@ -199,7 +200,7 @@ def status(context: click.Context, folder: Path) -> None:
     elif missing:
         say("no process is running; to resume, repeat the same `urdfkin validate ... --store` command")
     if failed:
-        say("to compute the failed robots again, add --retry failed to the same command")
+        say("to compute the failed robots again, add `--retry failed` to the `urdfkin validate` command")
     context.exit(3 if missing or failed else 0)
 
 
@@ -216,7 +217,7 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
 
 
 def _why(store: Store, robot: int) -> str:
-    """Return the reason why the first failed chunk of a robot failed."""
+    """Return the reason why the validation of a robot failed."""
     from urdfkin.validation.answer import Failure  # noqa: PLC0415
 
     for index in range(len(store.manifest.cut)):
@@ -227,7 +228,7 @@ def _why(store: Store, robot: int) -> str:
 
 
 def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
-    """Return the mean seconds of a chunk, from a sample of finished chunks of many robots."""
+    """Return the mean time for a chunk of samples in seconds, from up to `_READ` finished chunks."""
     from urdfkin.validation.chunk import ChunkResult  # noqa: PLC0415
 
     known = [robot for robot, (done, _) in counts.items() if done]
@@ -246,10 +247,10 @@ def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=_FOLDER)
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:
-    """Merge other stores of the same validation into DIR.
+    """Merge other stores of the same validation into DIR, for example the stores of several machines.
 
-    For example, several machines each computed a part. Results of the accuracy study are copied too. Each
-    file is read and checked; damaged files are reported and skipped. DIR is made if it does not exist.
+    Results of the accuracy study are copied too. Each file is read and checked; damaged files are reported
+    and skipped. DIR is made if it does not exist.
     """
     from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.store import Store, opened  # noqa: PLC0415

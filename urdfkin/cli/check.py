@@ -60,13 +60,14 @@ class Outcome:
     """The results of all files.
 
     Attributes:
-        files: Names of the files that were read, as given.
+        files: The checked files, by name.
         findings: Findings to print.
-        silenced: Findings that comments suppress, each with the reason in its comment.
-        excerpts: For each finding, the line of the file with a caret below.
-        unreadable: One error for each file that could not be read.
-        unchanged: Number of files that are unchanged since the version of --changed-since.
-        known: Number of findings in the baseline, and number of baseline entries that no longer occur.
+        silenced: Pairs of a finding that a comment in the file suppresses, and the reason in this comment.
+        excerpts: For each finding, the line of the file, and a second line with a caret under the fault.
+        unreadable: The errors of the files that could not be read.
+        unchanged: Number of files that --changed-since skips because they have not changed.
+        known: Number of findings that the baseline file lists and the check suppresses. Second, the number of
+            entries in the baseline file that the check no longer finds.
         to_fix: Number of findings that --fix would fix.
         patches: The patches of --diff.
         unsafe: Number of further findings that --unsafe-fixes would fix.
@@ -84,7 +85,7 @@ class Outcome:
     unsafe: int = 0
 
     def add(self, file: str, found: Examined) -> None:
-        """Add the check's results for one file."""
+        """Add the result of checking one file."""
         excerpts = Excerpts(found.data)
         self.files.append(file)
         self.findings += found.findings
@@ -123,7 +124,8 @@ def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
         say("[*] --fix fixes these findings; --diff prints the changes")
     if unsafe := sum(bool(finding.fix and not finding.fix.is_safe) for finding in outcome.findings):
         many = "s" * (unsafe != 1)
-        say(f"--unsafe-fixes also fixes {unsafe} finding{many}, but rotates joints by more than rounding")
+        also = f"--unsafe-fixes also fixes {unsafe} finding{many}"
+        say(f"{also}, but rotates joints by more than a rounding error")
     worst = next((f.code for f in outcome.findings if f.severity is Severity.ERROR), None)
     if worst is not None:
         say(f"run 'urdfkin explain {worst}' for details: {page(worst).title}")
@@ -166,7 +168,7 @@ def difference(file: str, before: bytes, after: bytes) -> str:
 
 
 _SETTINGS = "urdfkin.settings"
-#: Settings with the same name as an option.
+#: The settings in pyproject.toml that set the default of an option of the same name.
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
@@ -233,7 +235,7 @@ settings_options = together(
         help="File with a table [tool.urdfkin] of settings.  [default: nearest pyproject.toml]",
     ),
 )  # fmt: skip
-#: For each field of `Limits`: the help text of its option.
+#: The help texts of the options --max-bytes, --max-depth and so on, by field of `Limits`.
 _MOST = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",
@@ -266,7 +268,9 @@ limit_options = together(
 @click.option("--output", "-o", type=_FILE, help="Write the findings, or the patch of --diff, to this file.")
 @click.option("--fix", is_flag=True, help="Apply the automatic fixes to the files.")
 @click.option(
-    "--unsafe-fixes", is_flag=True, help="Also apply fixes that rotate a joint by more than rounding."
+    "--unsafe-fixes",
+    is_flag=True,
+    help="Also apply fixes that rotate a joint by more than a rounding error.",
 )
 @click.option("--diff", is_flag=True, help="Print the changes of --fix as a patch, without applying them.")
 @click.option("--statistics", is_flag=True, help="Print the number of findings of each code.")
@@ -276,7 +280,7 @@ limit_options = together(
     is_flag=True,
     help="Print each finding on its own line. Default: one line for many findings of one kind.",
 )
-@mimic_option("Check the file for coupled (--mimic) or free (--no-mimic) mimic joints.  [default: mimic]")
+@mimic_option("Check with mimic joints coupled (--mimic) or as free joints (--no-mimic).  [default: mimic]")
 @root_joint_option("Also check that no name of the robot collides with this root joint.")
 @source_options
 @settings_options
@@ -285,7 +289,7 @@ limit_options = together(
 def command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
     """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
-    A FILE is a path, also of a USD or MJCF file, a name from `urdfkin robots`, or - for standard input. A
+    A FILE is the path of a URDF, USD or MJCF file, a name from `urdfkin robots`, or - for standard input. A
     FOLDER means all *.urdf files in it. Without FILE and FOLDER, the current folder is checked. A .xacro file
     is expanded in a restricted process that can only compute and read the files of its package
     (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request. Settings are in
@@ -389,15 +393,15 @@ class Run:
     """One check of many files.
 
     Attributes:
-        look: A function that checks one file.
+        look: Function that checks the text of one file.
         choice: Selects the findings to report.
         strict: Whether warnings become errors.
-        fold: Whether to report many findings with the same code as one finding.
+        fold: Whether to merge findings with the same code into one line of output.
         fix: Whether to apply fixes.
-        diff: Whether to collect fixes as patches.
-        unsafe: Whether to include the fixes of --unsafe-fixes.
-        version: The version of --changed-since, or None.
-        accepting: Whether a baseline is written.
+        diff: Whether to collect the changes that the fixes would make, as patches.
+        unsafe: Whether the user gave --unsafe-fixes.
+        version: The version that --changed-since names, or None.
+        accepting: Whether the user gave --write-baseline, so that all findings are accepted.
         outcome: The results so far.
     """
 
@@ -429,7 +433,7 @@ class Run:
                     if file not in (
                         word,
                         f"./{word}",
-                    ):  # the file was found in a folder that the user named
+                    ):  # found in a folder, not named by the user
                         demand_regular(Path(file))
                     self._check(file)
                 except UrdfkinError as error:
@@ -455,9 +459,9 @@ class Run:
     def _check_other(self, file: str) -> None:
         """Check a USD or MJCF file.
 
-        If the robot is invalid, convert it to URDF and add the findings about the URDF.
+        If `load` rejects the robot, add the findings of its error.
 
-        With --changed-since, an unchanged file is skipped; all findings of another file count as new.
+        With --changed-since, an unchanged file is skipped, and all findings of a changed file are reported.
         """
         if self.version is not None and self._is_unchanged(
             file, USD if is_usd(file) else _MJCF, self.version
@@ -487,9 +491,9 @@ class Run:
     def _is_unchanged(self, file: str, parts: tuple[str, ...], version: Version) -> bool:
         """Return whether a file, and every file that it may refer to, is the same as in an older version.
 
-        This method does not know to which files the file refers. It therefore returns True only if two
-        conditions hold. No file of the repository that ends with one of the suffixes `parts` has changed. The
-        file contains no name of a deleted file.
+        The files to which the file refers are not known here. If any file with a suffix in `parts` has
+        changed in the repository, the method therefore returns False. It also returns False if the file
+        mentions a deleted file.
         """
         if parts not in self._changed:
             self._changed[parts] = version.changed(parts)
@@ -520,11 +524,11 @@ class Run:
         return mended.text
 
     def _safe(self, chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
-        """Restrict a selection of findings to those with a fix that may be applied."""
+        """Return a filter that also rejects findings with an unsafe fix, unless --unsafe-fixes is given."""
         return lambda finding: chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
 
     def _with_severity(self, finding: Finding) -> Finding:
-        # A baseline stores the original severity: --strict must not change it.
+        # Do not apply --strict for --write-baseline: a baseline file stores each finding's original severity.
         raised = self.strict and not self.accepting and finding.severity is Severity.WARNING
         return replace(finding, severity=Severity.ERROR) if raised else finding
 
@@ -547,8 +551,8 @@ def _is_other(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            return False  # return before the next import, which loads NumPy
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  a check of a URDF does not need this slow import
+            return False  # without the next import, which loads NumPy
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  slow, and not needed for a URDF
 
     return is_mjcf(file)
 

@@ -1,8 +1,8 @@
 """Shell completion of commands, options, robots, files, frames, tables, codes and equations.
 
 Completion runs at each press of the Tab key, so it imports nothing heavy and reads only the names in a file.
-Names with characters that a shell interprets are not offered. The names come from files that may be hostile,
-and the shell interprets the completed command line.
+Completion does not offer names with characters that a shell interprets, such as `$(...)`. Such a name in a
+malicious file could make the shell run a command.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Pattern of the names that completion offers.
-#: The names have no quotes, no blanks and no characters that a shell expands.
-#: The names have no colon, because bash separates words at colons.
+#: Matches a name that completion may offer: a name without quotes, blanks, and characters that a shell
+#: expands. Names with a colon do not match, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
 #: Largest file that is read for its names, in bytes.
 _MOST = 10_000_000
-#: Elements that name a frame: children of the root in a URDF, at any depth in an MJCF file.
+#: The tags of the XML elements whose `name` is a frame. In a URDF, these elements are children of the root
+#: element. In an MJCF file, they are at any depth.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
@@ -43,7 +43,7 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Return the links and joints of the robot on the command line."""
+    """Return the names of the links and joints of the robot that the user has typed as ROBOT."""
     # While the user types the value of an option, click does not yet know the command's arguments.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _offered(_frames(robot), incomplete)
@@ -100,7 +100,7 @@ def _frames(word: str) -> Iterator[str]:
 
 
 SHELLS = ("bash", "zsh", "fish")
-#: Environment variable with which a shell's script asks click for completions.
+#: The completion script of the shell sets this environment variable; click then prints completions.
 VARIABLE = "_URDFKIN_COMPLETE"
 
 

@@ -20,7 +20,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import Answer, answering, compiling
 
-#: Formats of a table. They repeat `urdfkin.dh.export.FORMATS`, so that --help need not import that module.
+#: Formats of a table, copied from `urdfkin.dh.export.FORMATS`, so that --help need not import that module.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
     *("numpy", "sympy", "casadi", "matlab", "matlab-symbolic", "matlab-rst", "roboticstoolbox", "ets"),
@@ -66,7 +66,7 @@ choice_options = together(
     _choice(
         "--near-parallel",
         ("hayati", "strict"),
-        "Rows of nearly parallel axes: five parameters (Hayati), or four.",
+        "For nearly parallel joint axes, write five parameters (hayati) or four (strict).",
     ),
     click.option(
         "--snap",
@@ -78,10 +78,13 @@ choice_options = together(
     _choice(
         "--last",
         ("tip", "flange"),
-        "End of the last row: the tip, or the flange (the tool contains the remaining offset).",
+        "End the table at the tip; or at the flange, so that the tool transform leads to the tip.",
     ),
     _choice(
-        "--parallel-offset", ("last", "first", "each"), "Row whose d contains the offset along parallel axes."
+        "--parallel-offset",
+        ("last", "first", "each"),
+        "For several parallel axes: add the offset along them to d of the last one, of the first one, or"
+        " of each.",
     ),
     click.option(
         "--flip",
@@ -92,17 +95,17 @@ choice_options = together(
     _choice(
         "--first",
         ("base", "joint"),
-        "Position of frame 0: d1 contains the base's offset, or is zero (Craig's).",
+        "Place frame 0 at the base; or at the first joint as in Craig's book, so that d1 is zero.",
     ),
     _choice(
         "--sign",
         ("theta", "a", "alpha"),
-        "Choice of the direction of x: smallest theta, a not negative, or alpha not negative.",
+        "Choose the direction of the x axes so that |theta| is smallest, or that a or alpha is not negative.",
     ),
     _choice(
         "--slide",
         ("drawn", "minimal"),
-        "Position of a prismatic joint's axis: that of the URDF, or the one with a = 0.",
+        "For a prismatic joint: use the axis in the URDF (drawn), or a parallel axis with a = 0 (minimal).",
     ),
     click.option(
         "--like",
@@ -153,11 +156,12 @@ form_options = together(
 )
 
 
-#: Options that have no effect with --like, which chooses their values.
+#: --like replaces these options: they have no effect in a command line with --like.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: If ROBOT is a table, the command writes it unchanged unless one of these options is given. With one of
-#: these options, the command makes a robot from the table and derives a new table from this robot.
+#: If ROBOT is a table, the command writes the table unchanged, unless the user gives one of these options.
+#: With one of these options, the command makes a robot from the table and derives a new table from this
+#: robot.
 _DERIVED = ("base", "tip", "all_", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 
@@ -195,15 +199,16 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 def command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
-    The path may lead down the tree, up, or through the common ancestor. The table has the file's angles and
-    lengths, without rounding. --snap rounds angles, and prints a bound on the displacement of the tip. ROBOT
-    is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv, .tsv,
-    .md, .tex, .txt). If ROBOT is a table, its numbers stay the same, in the chosen convention. With options
-    that choose rows, a new table is derived from the table's robot. See `urdfkin explain urdf-to-dh`.
+    The path may go down or up the tree of links, or first up and then down. The table has the file's angles
+    and lengths, without rounding. --snap rounds angles, and prints a bound on the displacement of the tip.
+    ROBOT is a path, a name that `urdfkin robots` lists, - for standard input, or a table (.toml, .json, .csv,
+    .tsv, .md, .tex, .txt). If ROBOT is a table, the command writes the same table in the chosen convention.
+    With an option that affects the rows, such as --tip or --snap, the command derives a new table of the same
+    robot. See `urdfkin explain urdf-to-dh`.
 
-    Exit 0: verified, or the compared table agrees. 1: the compared table differs, or agrees only because
-    base, tool and zeros absorb a mistake, which is printed. 2: bad input. 3: not checked, or a strict table
-    that loses more to rounding than the robot itself.
+    Exit 0: verified, or the compared table agrees. 1: the compared table differs, or a mistake in the table
+    is hidden by the fitted base, tool and joint offsets. 2: bad input. 3: not checked, or the rounding error
+    of a strict table is larger than that of the robot.
     """
     from urdfkin.cli.dh_tables import Work, run  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415

@@ -40,12 +40,12 @@ from urdfkin.verify.verifier import TABLE_SAMPLES
 
 #: Formats that can contain several tables.
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: In these formats, the check's result is printed below the table. With other formats, it goes to stderr.
+#: In these formats, the check's result is printed below the table. With other formats, the result of the
+#: check goes to stderr.
 _PRINTED = ("terminal", "markdown")
 #: Formats for people. All other formats are for data and code.
 _TEXTS = (*_PRINTED, "html", "latex")
-#: Formats that round numbers, each with the number of digits of base and tool.
-#: None stands for the option --digits.
+#: For each format that rounds numbers: the number of digits in the base and tool transforms. None: --digits.
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
@@ -54,8 +54,8 @@ class Work:
     """The command's options.
 
     Attributes:
-        written: File of the given table, if ROBOT is a table and its rows are written as they are. None: the
-            table is derived from the robot.
+        written: File of the table, if ROBOT is a table that the command writes unchanged. None: the command
+            derives a table from the robot.
         choices: Other arguments of `Robot.dh`.
     """
 
@@ -90,7 +90,7 @@ class Work:
 
 
 def run(work: Work) -> Answer:
-    """Run the command and return its answer."""
+    """Return the result of `urdfkin dh`."""
     chosen = [
         name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
     ]
@@ -261,7 +261,7 @@ def _compare(work: Work, name: str) -> Answer:
 
 
 def _frame_of_robot(work: Work, name: object) -> str | None:
-    """Return the name of a table's base or tip frame if the robot has a frame of that name."""
+    """Return `name` if it is the name of a frame of the robot; otherwise None."""
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
 

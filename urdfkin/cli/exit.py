@@ -1,7 +1,8 @@
 """Exit codes of the commands, error messages, and a clean stop on SIGTERM and SIGHUP.
 
 SIGTERM and SIGHUP stop a command like an interrupt: finished results are saved. Exit code 1 always means a
-disagreement. Python also exits with 1 after an uncaught exception, so a crash has a code of its own here.
+disagreement. Python also exits with 1 after an uncaught exception, so urdfkin catches such exceptions and
+exits with 70.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 @dataclass(slots=True)
 class Stop:
-    """Record of the signal that stopped the command.
+    """Stores which signal stopped the command.
 
     Attributes:
         signal: The number of the signal; None if no signal stopped the command.
@@ -35,7 +36,10 @@ class Stop:
     signal: int | None = None
 
     def exit_code(self, otherwise: int) -> int:
-        """Return 128 + the number of the signal, as shells do. If a disagreement was found, return 1."""
+        """Return 128 + the number of the signal, as shells do.
+
+        If `otherwise` is 1 (a disagreement), return 1.
+        """
         return otherwise if self.signal is None or otherwise == 1 else 128 + self.signal
 
 
@@ -43,7 +47,7 @@ class Stop:
 def stoppable() -> Iterator[Stop]:
     """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved.
 
-    A signal that the parent process ignores (`nohup`) stays ignored.
+    After `nohup urdfkin ...`, SIGHUP is ignored.
     """
     stop = Stop()
 

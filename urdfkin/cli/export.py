@@ -45,10 +45,12 @@ EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
     type=click.Choice(tuple(FORMS)),
     default="tree",
     show_default=True,
-    help="Steps of the code: the joints of the URDF, the rows of a Denavit-Hartenberg table, or screws.",
+    help="Compute with the joints of the URDF (tree), a Denavit-Hartenberg table, or screws.",
 )
 @click.option(
-    "--name", metavar="WORD", help="Prefix of the function names. Default: names of the robot and the frame."
+    "--name",
+    metavar="WORD",
+    help="Prefix of the function names. Default: the names of the robot and the frame, joined.",
 )
 @click.option(
     "--check", "file", type=click.Path(path_type=Path), help="Run the test vectors of this exported file."
@@ -75,10 +77,10 @@ def command(
     """Write a frame's kinematics as code without loops, for one robot, with test vectors in the file.
 
     The robot's constants are part of the code, and each joint's sine and cosine are computed once. The
-    expressions are compared with Pinocchio before they are written. The file states how closely they agree.
-    It also contains test vectors with true values at fifty digits. --check compiles or imports a file and
-    runs its test vectors; the file can also do this alone. ROBOT is a path, a name that `urdfkin robots`
-    lists, or - for standard input.
+    expressions are compared with Pinocchio before they are written. The file states how closely the
+    expressions agree with Pinocchio. The file also contains test vectors with true values at fifty digits.
+    --check compiles or imports a file and runs its test vectors. You can also run the test vectors without
+    urdfkin. ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
 
     Exit 0: verified. 1: Pinocchio or a test vector disagrees. 2: bad input, or the file does not run here.
     3: not verified, or changed after it was written.

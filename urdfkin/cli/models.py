@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
-#: Options of `same` for two robots only.
+#: Options of `urdfkin same` that need exactly two robots.
 _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
 
 
@@ -37,17 +37,18 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--strict",
     is_flag=True,
-    help="Also exit 1 if the models are only equivalent, or if their joint limits differ.",
+    help="Also exit 1 if the models are equivalent but not the same, or if their joint limits differ.",
 )
 @click.option(
     "--within",
     type=NumberFrom(0.0),
-    help="Exit 0 only if it is proven that no frame of B is farther than this (m and rad) from A's.",
+    help="Exit 0 only if urdfkin proves that no frame of B is farther than this (m and rad) from the same"
+    " frame of A.",
 )
 @click.option(
     "--boxes",
     type=Whole(0),
-    help="Number of parts of joint space for distance bounds (default 131072; 0: no bounds).",
+    help="Divide joint space into this number of boxes to bound distances (default 131072; 0: no bounds).",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
 @click.option(
@@ -56,7 +57,7 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--write-map",
     type=_PATH,
-    help="Write the joint names, order, senses and zeros of B as TOML for --convention.",
+    help="Write the names, order, signs and zero positions of the joints of B as TOML, for --convention.",
 )
 @click.option(
     "--recheck", type=_PATH, help="Verify this certificate for A and B instead of comparing them again."
@@ -81,18 +82,20 @@ def same_command(
     schema: bool,
     **paths: Path | None,
 ) -> Answer:
-    """Prove whether A and B are the same robot in every configuration; with C, all pairs of them.
+    """Prove whether A and B are the same robot in every configuration; with C, compare each pair.
 
-    A and B are robots as in other commands, or Denavit-Hartenberg tables. They are the same if the screws of
-    all joints and the zero-configuration poses of all links agree. The models may differ in the base pose,
-    the joint zeros and senses, fixed links, names and the order of joints. If A and B differ, the command
-    prints an interval for the largest distance of each frame over all configurations within limits. The lower
-    end is attained at a printed configuration; the upper end is proven. The numbers of a USD file have single
-    precision. Two models are the same up to single precision if every joint differs only by the rounding of
-    its own numbers.
+    A and B are robots as in other commands, or Denavit-Hartenberg tables. A and B are the same robot if the
+    screws of all joints and the zero-configuration poses of all links agree. Fixed links, names and the order
+    of joints may differ. A and B are equivalent if they agree after a change of B. Examples of such changes
+    are another base pose, or another zero position of a joint. If A and B differ, the command prints two
+    bounds on the largest distance of each frame of B from the same frame of A. The distance reaches the lower
+    bound in a configuration that the command prints. It is proven that no configuration within the joint
+    limits exceeds the upper bound. The numbers of a USD file have single precision. Two models are the same
+    up to single precision if every joint differs only by the rounding of its own numbers.
 
     Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
-    --strict, also if only equivalent. 2: bad input. With --within, A and B are compared as written. Exit 0:
+    --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are
+    compared as written. Exit 0:
     all frames stay within the given distance. 1: a frame does not.
     """
     if schema:
@@ -197,10 +200,10 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
 
-    For each changed joint, the command prints how far its changes alone move the most affected frame. This
-    distance is the maximum over all configurations within limits, for equal joint coordinates of OLD and NEW.
-    The last line is for all changes together. Between URDF, MJCF and USD, the changes are the differences
-    that `same` finds. With C, all pairs are compared.
+    For each changed joint, the command prints how far the changes of this joint move the frame that moves
+    most. This distance is the maximum over all configurations within limits, for equal joint coordinates of
+    OLD and NEW. The last line of the output states how far all changes together move the frames. Between
+    URDF, MJCF and USD, the changes are the differences that `same` finds. With C, all pairs are compared.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

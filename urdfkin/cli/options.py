@@ -1,8 +1,9 @@
 """Arguments and options that commands share, and the rules for all options.
 
 - Numbers are decimal digits in ASCII. Click's own types also accept `1_000`, Arabic digits, `nan` and `inf`.
-- The suffix of a file or --format selects the output format. A contradiction between them is an error.
-- An option that has no effect in a command line is an error.
+- The suffix of a file or --format selects the output format. If the suffix and --format contradict each
+  other, urdfkin reports an error.
+- An option without an effect is an error, for example --seed without a random value.
 """
 
 from __future__ import annotations
@@ -71,10 +72,11 @@ def format_from_suffix(
     """Return the output format of the running command.
 
     Args:
-        context: Context of the command, which has a parameter `format_`.
+        context: The click context of the command; the command has the option --format.
         output: The file, or None for standard output.
-        endings: For each suffix, its formats; the first one is the default.
-        plain: Format of a file without a suffix.
+        endings: The formats that a file with each suffix can have, for example `{".py": ("numpy", "sympy")}`.
+            The first format is the default.
+        plain: The format to write if the file's name has no suffix.
 
     Raises:
         InputError: --format contradicts the suffix, or the suffix has no format.
@@ -113,12 +115,12 @@ def reject_unused_options(context: click.Context, idle: Collection[str], because
 
     Args:
         context: Context of the command.
-        idle: Names of the parameters without effect.
-        because: The condition under which these options have no effect, such as "with --opw". In the message,
-            it follows the words "does nothing".
+        idle: The options that have no effect, as names of parameters.
+        because: Why these options have no effect, for example "with --opw". The error message is then
+            "--format does nothing with --opw".
 
     Raises:
-        InputError: one of these options was given on the command line.
+        InputError: The user gave one of these options.
     """
     for parameter in context.command.params:
         if parameter.name in idle and typed(context, parameter.name):
@@ -135,7 +137,7 @@ _RANDOM_SAMPLES = 1
 
 
 def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
-    """Combine several click decorators, in the order given."""
+    """Combine several decorators of click into one, for example those of several options."""
 
     def decorate(function: _F) -> _F:
         for decorator in reversed(decorators):
@@ -149,7 +151,7 @@ _HOW = "urdfkin.how_to_load"
 
 
 def _remember(context: click.Context, parameter: click.Parameter, value: object) -> None:
-    """Store the value of an option; `how_to_load` returns it later, so that no command has to pass it on."""
+    """Store the value of an option that `how_to_load` returns later."""
     context.meta.setdefault(_HOW, {})[parameter.name] = value
 
 
@@ -190,7 +192,7 @@ def _remember_articulation(context: click.Context, _: click.Parameter, word: str
 
 
 def how_to_load() -> dict[str, Any]:
-    """Return the running command's options for `load`: its arguments from `mimic` to `articulation`."""
+    """Return the options of the running command that are arguments of `load`, for example `mimic`."""
     return dict(click.get_current_context().meta.get(_HOW, {}))
 
 
@@ -221,7 +223,7 @@ usd_options = together(
         help="Path of the articulation to load, if a USD stage has several.",
     ),
 )
-#: The options about the file of a robot, for example arguments of xacro.
+#: The options --xacro-arg, --variant and --articulation, which concern the robot's file.
 source_options = together(xacro_option, usd_options)
 
 
@@ -245,8 +247,8 @@ lock_options = together(
         metavar="NAME=VALUE",
         expose_value=False,
         callback=_remember_lock,
-        help="Fix a joint at a value: it has no number in q and no column; repeatable. With --joints, the"
-        " first may be a pose, such as ready.",
+        help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
+        " With --joints, the value of the first --lock may be a pose, such as ready.",
     ),
     click.option(
         "--joints",
@@ -336,7 +338,7 @@ convention_option = click.option(
     help="Convention of --q, --v, --a, --trajectory and of the result: the name of a tool (`urdfkin order`"
     " lists them), or a TOML file.",
 )
-#: The option --convention of a command that prints its result in urdfkin's own convention.
+#: The option --convention of a command that converts the joint values that it reads, but not its result.
 convention_of_input_option = click.option(
     "--convention",
     metavar="NAME|FILE",
@@ -348,7 +350,8 @@ convention_of_input_option = click.option(
 def trajectory_option(help_: str) -> Callable[[_F], _F]:
     """Make the option for a file of samples."""
     files = (
-        "CSV with columns t, coordinates, v:NAME, a:NAME, units as in 'elbow [deg]'; or .npz with t, q, v, a"
+        "CSV with the columns t, NAME, v:NAME and a:NAME for each joint, with units as in 'elbow [deg]';"
+        " or .npz with the arrays t, q, v and a"
     )
     return click.option(
         "--trajectory",
@@ -364,7 +367,7 @@ def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
 
 
 def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
-    """Read a trajectory with joint velocities and accelerations, and write its notes to stderr."""
+    """Read a trajectory with joint velocities and accelerations, and write remarks about it to stderr."""
     from urdfkin.robot.trajectory import read_trajectory  # noqa: PLC0415  keeps --help fast
 
     motion = read_trajectory(robot, path, convention=convention)
@@ -374,7 +377,7 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
 
 
 def tell_notes(motion: Trajectory) -> None:
-    """Write the notes of a trajectory to stderr. If v and a were computed, write how."""
+    """Write remarks about a trajectory to stderr, for example how v and a were computed."""
     for note in motion.notes:
         say(f"warning: {note}", err=True)
     if motion.rates != "as given":
@@ -388,7 +391,7 @@ def tell_limits(robot: Robot, q: FloatArray) -> None:
 
 
 def said_of(robot: Robot) -> dict[str, Any]:
-    """Return the robot's locked joints, which the JSON output lists with a result."""
+    """Return the robot's locked joints, for the JSON output."""
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
@@ -403,10 +406,12 @@ class Inputs:
         v: (n, n_v) joint velocities.
         a: (n, n_v) joint accelerations.
         t: (n,) times of a trajectory in s, or None.
-        base: Motion of the root link, or None.
-        said: Other settings on which the result depends. Titles and JSON output list these settings.
-        conversion: The convention of q, v and a, if it is not urdfkin's.
-        along: Whether the samples come from --trajectory. If so, each sample is one row of CSV.
+        base: Motion of the root link, from the file of --trajectory or from the --base options. None: not
+            given.
+        said: Other settings that affect the result, for example `{"relative_to": "base"}`. The title of a
+            table and the JSON output list these settings.
+        conversion: The conversion that --convention requests; None for urdfkin's own convention.
+        along: Whether the samples come from --trajectory. CSV output then has one line for each sample.
     """
 
     robot: Robot
@@ -422,23 +427,23 @@ class Inputs:
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """A name for each number of q."""
+        """The names of the entries of q."""
         return (self.conversion or self.robot).coordinate_names
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """A name for each number of v and a."""
+        """The names of the entries of v and a."""
         return (self.conversion or self.robot).rate_names
 
     def converted(self) -> Inputs:
-        """Return a copy with q, v and a in the convention."""
+        """Return a copy with q, v and a in the convention of --convention."""
         if self.conversion is None:
             return self
         q, v, a = self.conversion.to(self.q, self.v, self.a)
         return replace(self, q=q, v=v, a=a).saying(convention=self.conversion.convention.name)
 
     def saying(self, **more: Any) -> Inputs:
-        """Return a copy with additional settings, which titles and JSON output list."""
+        """Return a copy with more settings in `said`."""
         return replace(self, said={**self.said, **more})
 
 
@@ -463,7 +468,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
     """Load a command's robots; `--xacro-arg` applies to .xacro files, `--variant` to USD files.
 
     Raises:
-        UsageError: more than one comes from standard input.
+        UsageError: Two of the robots are `-`, that is, standard input.
     """
     from urdfkin.urdf.sources import is_usd, is_xacro  # noqa: PLC0415  keeps --help fast
 
@@ -471,7 +476,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that disable the options for file formats other than this robot's."""
+        """Return arguments with which `load` ignores the options for file formats of the other robots."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -495,12 +500,13 @@ def read_inputs(
 ) -> Inputs:
     """Read the values of q, v and a from the command line.
 
-    Batches must have the same length; a single row is repeated. `option` is the name of the option of q. The
-    values are in the given convention; the result is in urdfkin's.
+    If --q, --v and --a name several samples, their numbers of samples must be equal; a single sample is
+    repeated. If `conversion` is given, it converts the values to urdfkin's convention. Error messages name
+    `option` as the source of q.
 
     Raises:
-        InputError: an invalid number, a wrong count, batches of different lengths, or a --seed that has no
-            effect.
+        InputError: A number is invalid, or there are too few or too many numbers. The numbers of samples
+            differ. Or --seed has no effect.
         SourceError: a file that cannot be read.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
@@ -527,7 +533,7 @@ def read_inputs(
 def _values(
     robot: Robot, letter: str, text: str, where: str, rng: Any, conversion: Conversion | None
 ) -> FloatArray:
-    """Return the (n, width) values of one option, in the given convention."""
+    """Return the values of --q, --v or --a as an array with one row for each sample."""
     from urdfkin.model.configuration import places, sample  # noqa: PLC0415
     from urdfkin.robot.trajectory import column_units  # noqa: PLC0415
 
@@ -559,11 +565,12 @@ def read_batch(
 ) -> tuple[FloatArray, Sequence[str]]:
     """Read a CSV file with one sample a line.
 
-    If the first line contains names, the columns may be in any order. The names of the columns in `units` may
-    also state a unit.
+    If the first line names the columns, they may be in any order. The name of a column in `units` may contain
+    a unit, for example "elbow [deg]".
 
     Returns:
-        The numbers (n, columns), and the layout that fits the number of columns in the file.
+        The numbers, with one row for each sample. Second, the list of column names from `layouts` whose
+        length is the number of columns in the file.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
@@ -626,11 +633,11 @@ def base_options(inputs: str) -> Callable[[_F], _F]:
 def with_base(
     x: Inputs, placement: str | None = None, velocity: str | None = None, acceleration: str | None = None
 ) -> Inputs:
-    """Return the inputs with the motion of the base, if any was given; a single row applies to a whole batch.
+    """Return the inputs with the motion of the base, if any was given; one motion may apply to all samples.
 
     Raises:
-        InputError: an invalid number, a wrong count, a quaternion that is not of length 1, or batches of
-            different lengths.
+        InputError: A number is invalid, or there are too few or too many numbers. A quaternion is not of
+            length 1. Or the numbers of samples differ.
         SourceError: a file that cannot be read.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
@@ -657,7 +664,7 @@ def with_base(
 
 
 def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
-    """Return the (n, width) numbers, and the layout that has this number of columns."""
+    """Return the numbers, one row for each sample, and the list of names from `layouts` that fits them."""
     import numpy as np  # noqa: PLC0415
 
     from urdfkin.robot.trajectory import numbers  # noqa: PLC0415

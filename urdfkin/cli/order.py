@@ -30,10 +30,10 @@ _NO_ORDER = (
 def command(robot: str, start: str | None, end: str | None) -> Answer:
     """Show the order of the joints in Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
 
-    A cell is the joint's index in q. If its index in v differs, the cell has both indices, as q/v. Tools with
-    the same indices share a column. With --from or --to, the command prints the permutation as lines of
-    NumPy. NAME is a tool from the table; FILE is a TOML file with your own order, signs, units and motor
-    zeros (docs/conventions.md).
+    For each joint and tool, the table contains the joint's index in q. If the index in v differs, the table
+    contains both indices, as in 7/6. Tools with the same indices share a column. With --from or --to, the
+    command prints NumPy code that reorders q and v. NAME is a tool from the table; FILE is a TOML file with
+    your own order, signs, units and motor zeros (docs/conventions.md).
     """
     loaded = load_robot(robot, verify=False)
     if start is None and end is None:
@@ -54,7 +54,7 @@ def _table(robot: Robot) -> Answer:
         heads = ("joint", *(first for first, *_ in groups.values()))
         rows = list(zip(robot.joint_names, *groups, strict=True))
         also = [f"{first}: also {', '.join(others)}" for first, *others in groups.values() if others]
-        title = f"{robot.name}: index of each joint in q, or its indices in q and v as q/v if they differ"
+        title = f"{robot.name}: index of each joint in q, or q/v if its index in v differs"
         return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
 
     def lines() -> Iterator[list[object]]:
@@ -67,11 +67,7 @@ def _table(robot: Robot) -> Answer:
 
 
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return the cell of each moving joint.
-
-    The cell is the index in q. If the index in v differs, the cell has both indices, as q/v. The cell is "-"
-    if the joint has no coordinate.
-    """
+    """Return each joint's index in q; "7/6" if its index in v differs; "-" if it has no coordinate."""
     indices = conversion.q_and_v_indices
 
     def span(at: list[int]) -> str:
@@ -116,7 +112,7 @@ def _code(start: Conversion, end: Conversion) -> Answer:
             given = "q_from" if letter == "q" else "q_from, v_from"
             made = "q_to" if letter == "q" else "q_to, v_to"
             star = "" if letter == "q" else "*"
-            yield f"# {letter}: the conversion is more than a permutation; use urdfkin:"
+            yield f"# {letter}: the conversion does more than reorder entries; use urdfkin:"
             yield f"{made} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({given}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"

@@ -36,13 +36,13 @@ if TYPE_CHECKING:
 
 #: Formats of a printed table.
 TEXTS = ("table", "markdown", "html", "latex")
-#: Suffix of a file for each format.
+#: The suffix of a file in each format.
 _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
     "latex": ".tex",
 }  # fmt: skip
-#: Largest width of a table in characters. Without a limit, one long cell would pad all other cells and fill
-#: the memory.
+#: Largest width of a table in characters. All cells of a column are padded to the same width: without a
+#: limit, one cell with a very long name could fill the memory.
 _WIDEST = 10_000
 
 output_option = click.option(
@@ -56,17 +56,17 @@ output_option = click.option(
 
 @dataclass(frozen=True)
 class Answer:
-    """The result of a command, from which every format is made.
+    """The result of a command; its methods write it as a table, JSON, CSV or another format.
 
     Attributes:
-        document: Returns the document for the formats of `TEXTS`, which are for people.
-        data: For each other format, a function that returns its data: a mapping for JSON, rows for CSV, an
-            array for npy, text for all others. A function for a format of `TEXTS` is called instead of
-            `document`.
-        check: The last line of the output, which states the result of the check. It is empty if the command
-            has nothing to check.
-        code: The exit code.
-        fitted: Returns the document for a terminal, if it depends on the terminal's width. None: `document`.
+        document: Function that returns the result as text and tables, for the formats in `TEXTS`.
+        data: Functions that return the result for other formats, by name of the format. The function returns
+            a mapping for JSON, rows for CSV, an array for npy, and text for any other format. If `data` has a
+            function for a format in `TEXTS`, `document` is not used for it.
+        check: The last line of the output, for example "verified by Pinocchio: ...". The line is empty if the
+            command checks nothing.
+        code: The exit code of the command.
+        fitted: Function that returns text and tables that fit the width of a terminal. None: use `document`.
     """
 
     document: Callable[[], TextDocument]
@@ -84,7 +84,7 @@ class Answer:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
     def write(self, form: str) -> tuple[bytes | str, bool]:
-        """Return the result in a format, and whether it contains the line about the check."""
+        """Return the result in a format, and whether the text contains the line `check`."""
         if form in self.data:
             found = self.data[form]()
             stated = form == "json" and isinstance(found, Mapping)
@@ -97,9 +97,9 @@ class Answer:
         return document.written(form), True
 
     def put(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
-        """Print the result as a styled document if `form` is the first format of `forms`.
+        """Print the result with colours if `form` is the command's default format, `forms[0]`.
 
-        If `form` is another format or if a file is given, write the result as plain data.
+        For another format or an output file, write the result without colours.
         """
         if form == forms[0] and output is None and form not in self.data:
             self.show(console())
@@ -126,12 +126,13 @@ _WRITERS: dict[str, Callable[[Any], bytes | str]] = {
 def answering(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
     """Return a decorator for a function that returns an `Answer`.
 
-    The decorated function has the options --format and --output. It writes the answer, and exits with the
-    answer's exit code.
+    The decorated function has the options --format and --output. The decorated function writes the answer and
+    ends the command with the answer's exit code.
 
     Args:
-        names: The formats. The default is the formats of `TEXTS`, JSON and CSV.
-        suffixes: For each suffix of a file, its formats. By default, each format has one suffix.
+        names: The output formats of the command. Default: the formats in `TEXTS`, JSON and CSV.
+        suffixes: The formats that a file with each suffix can have. Default: `_SUFFIXES`, with one format for
+            each suffix.
     """
     forms = names or (*TEXTS, "json", "csv")
     endings = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
@@ -189,7 +190,7 @@ def compiling() -> Iterator[None]:
 def console(*, err: bool = False) -> Console:
     """Return a console with the width of the terminal.
 
-    In a pipe, COLUMNS sets the width; without it, nothing wraps.
+    If the output goes to a pipe, the variable COLUMNS sets the width. Without COLUMNS, no line is wrapped.
     """
     from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  keeps --help fast
 
@@ -198,7 +199,7 @@ def console(*, err: bool = False) -> Console:
 
 
 def _columns() -> int:
-    """Return the variable COLUMNS as a number, or the largest width if COLUMNS is empty or 0."""
+    """Return the value of the variable COLUMNS, or `_WIDEST` if COLUMNS is empty or 0."""
     wanted = parse_int(os.environ.get("COLUMNS", "")) or 0
     return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 
@@ -224,7 +225,7 @@ def check_writable(*paths: Path | None) -> None:
         if path is None:
             continue
         try:
-            if path.exists() and not path.is_file():  # a device or a pipe is written directly
+            if path.exists() and not path.is_file():  # a device or a pipe needs no temporary file
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
                 pass
@@ -234,7 +235,7 @@ def check_writable(*paths: Path | None) -> None:
 
 
 def check_line(certificate: Certificate) -> str:
-    """Return one line: number of checked results and worst disagreement, or the reason for no check."""
+    """Return a line with the number of checked results and the worst disagreement, or with "NOT VERIFIED"."""
     by = certificate.oracle
     if certificate.not_verified:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
@@ -247,15 +248,15 @@ def check_line(certificate: Certificate) -> str:
 
 
 def exit_code(certificate: Certificate) -> int:
-    """Return 0 for verified results, 3 for results without a check."""
+    """Return the exit code: 0 if the results were checked, 3 if they could not be checked."""
     return 0 if certificate.verified else 3
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
-    """Return the last output line and the exit code of a command about a path between two frames.
+    """Return the last line and the exit code of `urdfkin chain`, `screws`, `structure` or `dh`.
 
     Args:
-        check: The result of the check, or None if nothing was checked.
+        check: What Pinocchio has checked, for example a `TableCheck`; None if nothing was checked.
     """
     from urdfkin.verify.pinocchio import version  # noqa: PLC0415  keeps --help fast
 

@@ -40,7 +40,7 @@ def _path_command(
 ) -> Callable[[Callable[..., Answer]], click.Command]:
     """Return a decorator that makes a command with the options --base and --tip of a path.
 
-    `answers` is the return value of `answering`.
+    `answers` is a decorator that `answering` returns; it adds --format and --output.
     """
 
     def decorate(function: Callable[..., Answer]) -> click.Command:
@@ -61,12 +61,13 @@ def _path_command(
 def chain_command(
     robot: str, base: str | None, tip: str | None, q: str, convention: str | None, seed: int, verify: bool
 ) -> Answer:
-    """List the joints between two frames (section 7.5), in one configuration and in the base's axes.
+    """List the joints on the path between two frames (section 7.5), with their axes in one configuration.
 
-    Each joint has its axis z, its origin O and the interorigin vector d to the next origin, in metres. The
-    last vector d leads to the tip. The path may run up the tree: such a joint is marked "backwards", and its
-    axis is reversed so that its coordinate keeps the URDF's sign. A fixed joint has no row: its offset is
-    part of d. --q is the configuration of the whole robot.
+    For each joint, the table has the joint's axis z, its origin O and the vector d to the origin of the next
+    joint. All vectors are in the axes of the base, and O and d are in metres. The last vector d leads to the
+    tip. If the path passes a joint from its child link to its parent link, the joint is marked "backwards".
+    The axis of such a joint is reversed, so that the joint's coordinate has the same sign as in the URDF. The
+    table has no fixed joints: their offsets are added to d. --q is the configuration of the whole robot.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -134,7 +135,7 @@ def _kind_of_joint(joint: Any) -> str:
 def _vector(numbers: FloatArray) -> str:
     """Return the numbers as text with six digits.
 
-    A number below the rounding error of a length of one metre is shown as 0.
+    A number of magnitude 1e-15 or less is shown as 0.
     """
     return " ".join(six_digits(x) for x in numbers.tolist())
 
@@ -158,9 +159,9 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     """Derive the product of exponentials of a path in the notation of Lynch and Park.
 
     The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A screw
-    is (w, v), angular part first; generated code has the screws as columns of Slist and Blist. Every command
-    can load the TOML or JSON file that this command writes. In a handwritten file, M is required, and also
-    `space` or `body`, the screws.
+    is a vector (w, v), with the angular velocity w first. In generated code, each screw is a column of the
+    matrix Slist (space axes) or Blist (body axes). Every command can load the TOML or JSON file that this
+    command writes. If you write such a file by hand, it needs M, and the screws as `space` or as `body`.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -182,8 +183,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
         "--opw",
         type=Number(),
         metavar="MM",
-        help="Print parameters for OPW solvers as YAML; it is an error if the tip deviates by more than MM"
-        " (mm and mrad).",
+        help="Print the parameters of an OPW solver as YAML. Fail if the tip deviates by more than MM (mm and"
+        " mrad).",
     ),
     answers=answering(*TEXTS, "json"),
 )

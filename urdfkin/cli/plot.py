@@ -49,9 +49,13 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
     "start",
     default="neutral",
     show_default=True,
-    help="With --to: first configuration of a line in joint space, written like --q in other commands.",
+    help="With --to: configuration at which the line in joint space begins, written like --q.",
 )
-@click.option("--to", "end", help="Last configuration of a line in joint space, written like --q.")
+@click.option(
+    "--to",
+    "end",
+    help="Configuration at which a line in joint space ends, written like --q in other commands.",
+)
 @click.option(
     "--duration",
     type=Number(),
@@ -99,11 +103,12 @@ def command(
 ) -> None:
     """Plot a frame's motion along a trajectory.
 
-    There are panels for q, v and a with their limits; for the position, the velocity and the acceleration of
-    the frame; for the parts of the acceleration; for the singular values; and for the check. Each axis has
-    one unit. --trajectory reads a CSV or .npz file. --to makes a line in joint space that begins and ends at
-    rest. A floating base moves along a screw. With --convention, the file and the values of --from and --to
-    are in that convention. The panels show the numbers of the URDF, in rad and m.
+    The plot has panels for q, v and a with their limits, and for the frame's position, velocity and
+    acceleration. Other panels show the parts of the acceleration, the singular values, and the result of the
+    check. Each axis has one unit. --trajectory reads a CSV or .npz file. --to makes a line in joint space
+    that begins and ends at rest. A floating base moves along a screw. With --convention, the file and the
+    values of --from and --to are in that convention. The panels show the joint values of the URDF, in rad and
+    m, also with --convention.
 
     Exit 0: verified. 1: a disagreement. 3: Pinocchio could not check it.
     """

@@ -1,7 +1,7 @@
 """Commands that compute a quantity of a frame, such as `urdfkin jacobian`, `placement` and `imu`.
 
-Each row of the table of quantities defines one command. All these commands have the same options, and read
-and write their data in the same way.
+`verify/quantities.py` lists the quantities, and each quantity has a command. All these commands have the same
+options, input formats and output formats.
 """
 
 from __future__ import annotations
@@ -68,15 +68,14 @@ _BASE = ("base_placement", "base_velocity", "base_acceleration")
 _trajectory = trajectory_option(
     "Read q, v and a from a file instead of --q, --v and --a. CSV output has a row for each time."
 )
-#: Number of samples of a batch that a table shows.
+#: Largest number of samples that the terminal output shows as tables.
 _SHOWN = 5
 
 
 def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
     """Return a decorator that adds the options of a quantity to a command.
 
-    The order of the options is: robot, frame, the options in `own`, convention, values of q, v and a,
-    trajectory, base, seed, checks, the options in `last`, format and output.
+    `--help` lists the options in `own` after --frame, and the options in `last` before --format.
     """
     return together(
         *(robot_argument, frame_option, *own, convention_option, *(_VALUES[letter] for letter in inputs)),
@@ -92,7 +91,7 @@ def _load() -> Robot:
 
 
 def _read() -> Inputs:
-    """Load the robot of the running command, and read q, v and a or the trajectory, and the base."""
+    """Load the robot of the running command. Read q, v and a, or --trajectory. Read the --base options."""
     options = click.get_current_context().params
     values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
     robot = _load()
@@ -131,7 +130,7 @@ def _along(
 
 
 def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any) -> Answer:
-    """Return an answer whose last line and exit code are those of the robot's certificate."""
+    """Return an answer whose last line and exit code state the result of the check with Pinocchio."""
     certificate = x.robot.certificate()
     check = check_line(certificate)
     if x.conversion is not None:
@@ -145,7 +144,7 @@ def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], 
 
 
 def _samples(x: Inputs, shown: int, others: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the index and the heading of each sample that the output shows as a table."""
+    """Yield the index and the heading of each of the first `shown` samples."""
     n = len(x.q)
     for k in range(min(n, shown)):
         heading = f"sample {k}" if x.t is None else f"t = {x.t[k]:.6g} s"
@@ -161,7 +160,7 @@ _ROBOT = (
 _breakdown = click.option(
     "--breakdown",
     is_flag=True,
-    help="Split the acceleration into parts by joint and term, which add up to it.",
+    help="Print the contribution of each joint to the acceleration, split into terms such as Coriolis.",
 )
 
 
@@ -196,7 +195,7 @@ def command_of(quantity: Quantity) -> click.Command:
 
 
 def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None) -> Answer:
-    """Return the results (n, ...) of n samples as an answer."""
+    """Return the answer for the results of n samples; `result` is an array of shape (n, ...)."""
     x = x.converted()
     if x.conversion and x.conversion.angular_first and quantity.labels == SIX:
         units = dict(reversed(list(quantity.units.items())))
@@ -244,8 +243,8 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.columns and not x.along:
         rates = [csv_cell(name) for name in x.rate_names]
-        # The table of a Hessian has a line for each column of the Jacobian.
-        # It has a column for each joint velocity.
+        # The CSV of a Hessian has one line for each entry of the Jacobian. Each line lists the derivatives of
+        # this entry with respect to each joint.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -262,15 +261,12 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Headings of the first CSV column, for results without times and for results with times.
+#: Heading of the first CSV column: "t" if the samples have times, otherwise "sample".
 _TIME = ("sample", "t")
 
 
 def _times(x: Inputs) -> Iterable[object]:
-    """Return the first cell of each sample's row.
-
-    It is the time of the sample, or the index of the sample if there are no times.
-    """
+    """Return the times of the samples, or their indices if they have no times."""
     return range(len(x.q)) if x.t is None else map(repr, x.t.tolist())
 
 
@@ -290,9 +286,9 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 
 
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
-    """Return the table's rows: one row for each joint velocity.
+    """Return a table with one row for each entry of v, that is, the entry's column of the Jacobian.
 
-    For a Hessian, return a row for each pair of joint velocities whose numbers are not all zero.
+    For a Hessian, the table has one row for each pair of entries of v whose derivatives are not all zero.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
@@ -308,11 +304,14 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
 
 def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
-    """Return the terms of the acceleration, joint by joint. The check covers their sum, the acceleration."""
+    """Return the contribution of each joint to the acceleration of the frame.
+
+    Pinocchio checks the sum of the contributions, which is the acceleration.
+    """
     from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
 
     def parts() -> Iterator[str | Table]:
-        yield "m/s^2 and rad/s^2; transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z (7.125)"
+        yield "m/s^2, rad/s^2; terms (7.125): transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z"
         heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
         for k, heading in _samples(x, 2, "csv, json or npy"):
             yield from heading
@@ -320,7 +319,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
                 continue
             noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
             rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
-            # Four digits, so that a row fits on the terminal.
+            # Print four digits, so that a row fits on the terminal.
             cells = [
                 (*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows
             ]
@@ -355,7 +354,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 # -- commands with options of their own --------------------------------------------------------------
 
 _POSITION = ("x", "y", "z")
-#: Forms in which a pose can be printed, besides the matrix.
+#: The choices of `placement --as`, except the matrix.
 _FORMS = {
     "rpy": replace(
         PLACEMENT,
@@ -388,15 +387,16 @@ _FORMS = {
         type=click.Choice(["matrix", *_FORMS]),
         default="matrix",
         show_default=True,
-        help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
+        help="How to print the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
         " quaternion: x, y, z, qx, qy, qz, qw. wxyz: x, y, z, qw, qx, qy, qz.",
     ),
 )
 def placement_command(relative_to: str | None, written: str, verify: bool, **_: Any) -> Answer:
     """Compute the pose of a frame (eq. 7.77) in the world or in another frame, in metres.
 
-    The pose is a matrix T with the frame's axes and origin, or, with --as, six or seven numbers. Pinocchio
-    checks that these numbers give the same rotation.
+    The pose is a matrix T with the frame's axes and origin. With --as, the pose is a position and three
+    angles, or a position and a quaternion. Pinocchio checks that the angles or the quaternion give the same
+    rotation as T.
 
     ROBOT is a path, a name from `urdfkin robots`, or - for standard input. ROBOT can also be the file of a
     Denavit-Hartenberg table (.toml, .json or .csv).
@@ -419,7 +419,7 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
 def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
     """Return the position and orientation of each pose as (n, 6) or (n, 7) numbers.
 
-    If Pinocchio has checked the poses, it checks these numbers too.
+    If Pinocchio has checked the poses, Pinocchio also checks these positions and orientations.
     """
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
@@ -438,7 +438,7 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
 
 def _again(x: Inputs, k: int, written: str) -> str:
-    """Return a command line with which the user can compute the pose of sample `k` alone."""
+    """Return a command line that computes only the pose of sample `k`, for an error message."""
     line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
     given = click.get_current_context().params
     for name in ("relative_to", "base_placement"):
@@ -447,7 +447,7 @@ def _again(x: Inputs, k: int, written: str) -> str:
     return f"{line} --as {written}"
 
 
-#: A copy of `urdfkin.kinematics.rotation.SEQUENCES`: importing it would slow --help down.
+#: Copied from `urdfkin.kinematics.rotation.SEQUENCES`, because importing that module would slow --help down.
 _TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
@@ -463,8 +463,8 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
         metavar="NAME",
         default="ZYZ",
         show_default=True,
-        help="rpy (roll, pitch, yaw as in a URDF), quaternion, or Euler angles by their axes: capitals are"
-        " moving axes (ZYZ), small letters fixed axes (xyz is rpy).",
+        help="rpy (roll, pitch, yaw as in a URDF), quaternion, or the axes of three Euler angles: capital"
+        " letters for moving axes (ZYZ), small letters for fixed axes (xyz, which is rpy).",
     ),
     click.option(
         "--nearest",
@@ -476,8 +476,9 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    The table has one row for each joint velocity. A row lists the derivatives of the frame's position and
-    orientation (Euler angles or a quaternion). `urdfkin jacobian` has angular velocities instead.
+    Each row of the table belongs to one entry of v, for example the velocity of one joint. The row lists the
+    rates of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity. `urdfkin
+    jacobian` prints angular velocities instead.
     """
     from urdfkin.kinematics.rotation import NEAREST  # noqa: PLC0415  keeps --help fast
 
@@ -544,7 +545,7 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     type=click.Choice(["all", "linear", "angular"]),
     default="all",
     show_default=True,
-    help="Rows of the Jacobian; `all` mixes metres and radians.",
+    help="Use all rows of the Jacobian, or only the linear or angular ones; `all` mixes metres and radians.",
 )
 @convention_option
 @q_option
@@ -564,8 +565,8 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     a configuration, the manipulability may have no derivative. A missing derivative is nan in CSV and null in
     JSON. See `urdfkin explain singularity`.
 
-    With --convention, the derivatives are for the tool's joint velocities. The singular values are always for
-    joint velocities in rad/s and m/s.
+    With --convention, the derivatives are with respect to the joint coordinates of that convention. The
+    singular values are always for joint velocities in rad/s and m/s.
     """
     x = _read()
     with compiling():
@@ -626,7 +627,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
 
 def _between(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield (name, value, lower bound, upper bound) for each number of a sample."""
+    """Yield name, value and bounds of the singular values, condition and manipulability of sample `k`."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
     for name, between in (("condition", found.condition), ("manipulability", found.manipulability)):

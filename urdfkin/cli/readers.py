@@ -33,10 +33,11 @@ EXAMPLE = "urdfkin readers ur5 --with mujoco,yourdfpy"
 def command(robot: str, libraries: str | None, samples: int, seed: int) -> Answer:
     """Compare how other libraries read ROBOT: joints, their order, and the poses of all links.
 
-    Each library of this Python environment reads the file in a process of its own: Pinocchio, MuJoCo, Drake,
-    iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics Toolbox, scikit-robot. Pinocchio and MuJoCo read
-    MJCF files, and Newton reads USD files. The poses of all links are compared with urdfkin's. For each joint
-    that a library reads differently, the command names the element of the file that explains the difference.
+    The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
+    Toolbox and scikit-robot. Each installed library reads the file in a process of its own. Pinocchio and
+    MuJoCo read MJCF files, and Newton reads USD files. The poses of all links are compared with urdfkin's. If
+    a library reads a joint differently, the command names the element of the file that causes the difference,
+    for example the joint's `axis`.
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
     """

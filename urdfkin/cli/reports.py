@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
 
-#: The files of a report in one format, each with its path.
-#: They are a single file, or a page with a folder of files.
+#: The paths and contents of the files of a report in one format. Most formats have one file; an HTML report
+#: can have a page and a folder of other files.
 Files = Iterator[tuple[Path, bytes]]
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
 
-#: Parameter names of the options for a report's files.
+#: The options that name an output file of a report, as names of parameters.
 FILES = ("json_", "html", "junit", "markdown")
 report_options = together(
     click.option("--html", type=_PATH, help="Write the report as an HTML page that works offline."),
@@ -129,10 +129,10 @@ def show(
 ) -> None:
     """Show a report or convert it to HTML, JUnit or Markdown.
 
-    RESULTS can be a store at any time, also during a validation. An incomplete store is shown as an
-    interrupted run.
+    RESULTS can be the folder of --store, even while the validation runs. If robots are still missing in this
+    folder, the command shows the run as interrupted.
 
-    The exit status is the exit status of the run. 0: everything verified. 1: a disagreement. 2: a robot could
+    The exit code is that of the validation. 0: everything verified. 1: a disagreement. 2: a robot could
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
@@ -178,12 +178,12 @@ def show(
 def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) -> Answer:
     """Compare two reports: versions, robots, verdicts and disagreements.
 
-    A regression is one of these: the run passed before and fails now; a robot is missing, or its verdict is
-    worse; more results lie outside their bound; something is no longer compared, or on fewer samples; a bound
-    is wider; a worst disagreement grew by more than the factor and is above 2 eps*scale. A changed model is
-    listed joint by joint. A changed model alone is not a regression; `same` and `diff` compute how far its
-    frames move.
-    A report that contradicts itself is an error.
+    Each of these changes is a regression. The run passed before and fails now. A robot is missing, or its
+    verdict is worse. More results lie outside their bound. A quantity is no longer compared, or it is
+    compared on fewer samples. A bound is wider. A worst disagreement grew by more than the factor and is
+    above 2 eps*scale. A changed model is listed joint by joint. A changed model alone is not a regression;
+    `same` and `diff` compute how far its frames move. If a report contradicts itself, for example in its
+    numbers of samples, the command exits with 2.
     Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
     """
     from urdfkin.report.compare import compare, document, markdown_of  # noqa: PLC0415
@@ -204,7 +204,7 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 
 @report_command.command(
     "history",
-    short_help="Show how verdicts, results and findings changed over runs.",
+    short_help="Show how the results of each robot changed over several validations.",
     epilog="Example: urdfkin report history nightly --output history.html",
 )
 @click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=click.Path(path_type=Path))
@@ -212,12 +212,12 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
 @answering(*TEXTS, "json")
 def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
-    """Show how the verdicts, results and findings of each robot changed over several runs.
+    """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
 
-    Give reports, stores, or folders with them. Runs are ordered by their start. Robots are matched by the
-    path of their file. If a file was renamed, they are matched by the robot's name. Changes and regressions
-    are defined as in `report compare`. With `--output history.html`, the command writes an offline page with
-    charts.
+    Give reports, stores, or folders with them. Runs are ordered by their start. The command identifies a
+    robot in all runs by the path of its file. If a file was renamed, the command uses the robot's name.
+    Changes and regressions are defined as in `report compare`. With `--output history.html`, the command
+    writes an offline page with charts.
 
     If a file cannot be used, the command prints its name and the reason, and shows the other files.
     Exit 0: every file was used. 2: a file cannot be used.

@@ -28,8 +28,8 @@ _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 def robots_command(family: str | None) -> Answer:
     """List the robots of the catalogue, which are loaded by name.
 
-    They are the URDF files of example-robot-data and urdfkin's own. The base and tip of a robot's first limb
-    are the defaults of --base, --tip and --frame.
+    The catalogue contains the URDF files of example-robot-data and of urdfkin. If a command has the option
+    --base, --tip or --frame, its default is the base or the tip in this list.
     """
     entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
     if not entries:
@@ -74,10 +74,10 @@ _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
-    Joints are in the order of q, of v and of a Jacobian's columns, which is Pinocchio's order. If the file
-    has another order, a line reports it. Limits are in rad and rad/s; those of prismatic joints are in m and
-    m/s. A link that is not indented is a child of the link above it. If a link has several children, lines
-    lead to them.
+    The joints have the same order as in q, in v and in the columns of a Jacobian. This order is Pinocchio's.
+    If the joints have another order in the file, the command reports it. Limits are in rad and rad/s; those
+    of prismatic joints are in m and m/s. A link that is not indented is a child of the link above it. If a
+    link has several children, lines lead to them.
     """
     loaded = load_robot(robot)
     data = {"json": lambda: _describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}
@@ -100,7 +100,7 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
     """Yield the rows of the table.
 
-    The first cell is the link's name, without the branches of the drawn tree.
+    The first column contains the names of the links, without the lines of the drawn tree.
     """
     for part in document.parts:
         if isinstance(part, Table):

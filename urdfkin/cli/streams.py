@@ -1,13 +1,13 @@
 """Safe standard streams: robust against stream failures, and against control characters in names.
 
-A shell can close a standard stream. It can also connect the stream to a full disk, or to a program that exits
-before it has read everything. The encoding of a stream may not support every character of a name. With this
-module, none of these cases causes a traceback.
+A shell can close standard output. Standard output can be a file on a full disk, or a pipe to a program that
+exits early. The encoding of standard output may not support every character of a joint's name. This module
+handles all these failures without a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
-commands of CI services. All output passes through this stream, also the output of click and Python. The
-stream does not escape line feeds, because it cannot detect whether a line feed is part of a name. The
-function `say` and the class `Terminal` know the names and escape line feeds in them.
+commands of CI services. All output passes through this stream, also the output of click and Python. A
+`SafeStream` does not escape line feeds, because most line feeds end a line of output. Line feeds in names are
+escaped earlier, by the function `say` and the class `Terminal`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ def prepare() -> None:
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
     warnings.showwarning = _warn
-    # Commands print their own line if joint values look like degrees, so the library's warning is hidden.
+    # Hide the library's warning about joint values that look like degrees: each command prints its own line
+    # about such values.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
@@ -78,7 +79,7 @@ class _Raw(io.FileIO):
 
 
 def _with_errors(stream: Any, descriptor: int) -> Any:
-    """Replace a standard stream by one that reports errors; keep a stream that a test has substituted."""
+    """Return a standard stream that reports write errors; return the stream of a test unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -95,10 +96,10 @@ def _with_errors(stream: Any, descriptor: int) -> Any:
 
 
 def _occupy_closed() -> None:
-    """Open the null device for each closed stream; otherwise the next opened file would get its descriptor.
+    """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
 
-    Reading the replaced standard input fails, and so does writing to the replaced standard output. Text for
-    standard error is lost.
+    If standard input was closed, reading from it fails. If standard output was closed, writing to it fails.
+    If standard error was closed, text written to it is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -121,22 +122,22 @@ def _warn(
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
-#: Escape sequences of rich: colours, and cursor movements of a progress bar.
+#: Matches the escape sequences that the package rich writes, for colours and for progress bars.
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Number of stored characters of an unfinished line.
-#: They are checked again together with the next piece of text.
+#: Largest number of stored characters of an unfinished line. A CI command may be written in two pieces, so
+#: these characters are searched again together with the next piece.
 _STORED = 64
 
 
 class SafeStream:
     """A text stream that escapes control characters and CI commands.
 
-    Machine formats are written to its `buffer`, as bytes.
+    The bytes of a NumPy file are written to the attribute `buffer`, without escapes.
 
     Args:
         stream: The stream to write to.
-        styled: Whether escape sequences for styles are kept. Set this only if nothing but rich writes to the
-            stream.
+        styled: Whether the stream passes on escape sequences for colours. Set this only if nothing but the
+            package rich writes to the stream.
         encoding: The encoding that this stream reports.
     """
 
@@ -167,7 +168,7 @@ class SafeStream:
         self.stream.buffer.flush()
 
     def tamed_file(self, text: str) -> str:
-        """Return a file's text as `write_file` writes it; a carriage return before a line feed stays."""
+        """Return the text that `write_file` writes; a carriage return at the end of a line is not escaped."""
         *lines, last = text.split("\n")
         plain = [_plain(line.removesuffix("\r")) + "\r" * line.endswith("\r") for line in lines]
         return self._without_commands("\n".join([*plain, _plain(last)]))
@@ -191,7 +192,8 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # If the line is long, store only its end. An "x" replaces the beginning if it is not blank.
+        # Of a long line, store only the last 16 characters. An "x" before them means that the removed text
+        # was not blank.
         self._line = whole if len(whole) <= _STORED else ("x" if whole.strip() else "") + whole[-16:]
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
 
@@ -235,7 +237,7 @@ def say_file(text: str) -> None:
 
 
 def harmless(text: str) -> str:
-    """Return a text of whole lines with the same escapes as in the output of `say_file`."""
+    """Return a text as `say_file` would print it, with control characters escaped."""
     return SafeStream(sys.stdout).tamed_file(text)
 
 

@@ -56,13 +56,13 @@ def judge_all(
     robots.
 
     Args:
-        report: The report of `validate` on the given robots, in their order.
+        report: The report of `validate` for the same robots, in the same order.
         given: Robots, or their sources.
         settings: Settings of the study.
-        store: Folder of the campaign, which also stores the results of the study; None: no store.
-        shard: Part of the campaign. Only robots with their first chunk in this part are studied. The argument
-            `report` must be the report of the same part.
-        retry: Whether to repeat studies that failed before.
+        store: Folder of --store, into which the results of the study are also written; None: no folder.
+        shard: The value I/N of --shard. This process studies only the robots whose first samples belong to
+            part I. `report` must be the report of part I.
+        retry: Whether to repeat the study of a robot whose study failed in an earlier run.
         how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
 
     Returns:
@@ -99,7 +99,7 @@ def judge_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyResult | None]:
-    """Open the accuracy results of a store, and lock the whole store or one part of it."""
+    """Open the accuracy results of a store, or of one part of it, so that no other process can write them."""
     if folder is None:
         yield None
         return
@@ -118,7 +118,7 @@ def _open_results(
 def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[Judgement | NotJudged, bool]:
-    """Return the accuracy result of a robot, and whether a repeated study would give the same result."""
+    """Study a robot. Return the accuracy result, and whether to store it (not after a crash)."""
     import numpy as np  # noqa: PLC0415  keeps --help fast
 
     from urdfkin.model.configuration import draw_base  # noqa: PLC0415
@@ -229,12 +229,13 @@ def command(
 ) -> None:
     """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
 
-    Compared: {compared}. Not compared: {not_compared}. The library and the commands check these quantities
-    in each call.
+    Compared: {compared}. Not compared: {not_compared}. For quantities that are not compared here, urdfkin
+    checks each result when it computes the result.
 
-    Configurations are random within the limits. The neutral configuration and both ends of the limits are
-    added. Every eighth sample has joint velocities and joint accelerations a hundred times larger.
-    Disagreements are in multiples of eps * scale: rounding gives 1 to 10. Exit 0: verified. 1: a
+    Configurations are random within the joint limits. The command adds the neutral configuration, and the
+    configurations in which all joints are at their lower or upper limits. In every eighth sample, joint
+    velocities and accelerations are a hundred times larger than in the others. Disagreements are in multiples
+    of eps * scale, where eps is 2.2e-16; rounding alone gives 1 to 10. Exit 0: verified. 1: a
     disagreement. 2: a robot cannot be read. 3: a robot was not verified. 128 + n: stopped by signal n;
     finished results are saved.
 

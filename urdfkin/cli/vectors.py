@@ -25,7 +25,7 @@ EXAMPLE = "urdfkin vectors write vectors ur5 panda"
 def vectors_command() -> None:
     """Write test vectors for other programs.
 
-    A library of any language compares its own results with them. docs/vectors.md explains how.
+    A library in any language compares its own results with these test vectors. docs/vectors.md explains how.
     """
 
 
@@ -53,13 +53,14 @@ def write_command(
 ) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
-    Without ROBOT, the command uses the robots of the catalogue, and some 70 small robots with one feature of
-    URDF each. With ROBOT, it uses only the given robots. For each robot, there is a JSON file, and a text
-    file with the same numbers, separated by tabs. SHA256SUMS has the digests of all files.
+    Without ROBOT, the command writes the vectors of the robots of the catalogue, and of some 70 small robots.
+    Each small robot tests one feature of URDF. With ROBOT, the command writes the vectors of only the given
+    robots. For each robot, there is a JSON file, and a text file with the same numbers, separated by tabs.
+    SHA256SUMS has the digests of all files.
 
     The results are the placement, velocity, Jacobian, Jacobian rate, Hessian, classical acceleration and
-    spatial acceleration. All but the placement are written in LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files
-    depend only on the robots and --samples.
+    spatial acceleration. The files contain the placement once, and each other quantity in the frames LOCAL,
+    WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and --samples.
     """
     from urdfkin.validation import vectors  # noqa: PLC0415  keeps --help fast
 

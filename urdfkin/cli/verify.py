@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: Names of the quantities that can be checked. Each has one result for each configuration.
+#: The quantities that can be checked. Your function returns one result for each configuration.
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
 
 
@@ -44,7 +44,7 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
 @click.option(
     "--quantity",
     type=click.Choice(_QUANTITIES),
-    help="Quantity that the function computes. Default: the quantity that the function is named after.",
+    help="Quantity that the function computes. Default: the quantity in the function's name.",
 )
 @frame_option
 @reference_option
@@ -58,10 +58,15 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     type=NumberFrom(min=0, min_open=True),
     default=1.0,
     show_default=True,
-    help="Factor of the derived bound, for a function that rounds more often than the textbook's recursion.",
+    help="Multiply the bound by this factor, for a function that rounds more often than the textbook's"
+    " recursion.",
 )
-@click.option("--batch", is_flag=True, help="The function takes q (n, nq) and returns n results.")
-@click.option("--program", is_flag=True, help="TARGET is the command of a program that answers JSON lines.")
+@click.option(
+    "--batch", is_flag=True, help="Call the function with many configurations at once: q is an array (n, nq)."
+)
+@click.option(
+    "--program", is_flag=True, help="TARGET is the command of a program that reads and writes lines of JSON."
+)
 @click.option(
     "--timeout",
     type=NumberFrom(min=0, max=86400, min_open=True),
@@ -94,15 +99,16 @@ def verify_command(
 ) -> Answer:
     """Compare your function or program with urdfkin and Pinocchio, within the derived bound.
 
-    TARGET is FILE.py:FUNCTION. With FILE.py alone, the command checks each function that has the name of a
-    quantity. A function takes q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and seconds.
-    It returns the result as an array. --program checks a program in any language: it reads lines of JSON and
-    answers each with a line {"result": [...]}. The file and the program run with your rights.
+    TARGET is FILE.py:FUNCTION. If TARGET is FILE.py, the command checks each function of the file whose name
+    contains a quantity, for example `jacobian`. The arguments of a function are the arrays q (nq,), v (nv,)
+    and a (nv,), in rad, m and seconds. A function for a pose or a Jacobian has only the argument q. The
+    function returns an array. --program checks a program in any language: the program reads lines of JSON and
+    answers each line with a line {"result": [...]}. The file and the program run with your rights.
 
-    The configurations are the zero configuration, the joint limits and random ones. If a usual mistake
-    explains wrong results, the command names it. Examples are another reference frame, joint order, sign,
-    unit or frame, and a missing term. Exit code 0: all results agree; 1: they do not; 3: no oracle can check
-    the robot.
+    The command calls the function in the zero configuration, at the joint limits, and in random
+    configurations. If a usual mistake explains wrong results, the command names the mistake. Examples are a
+    wrong frame, reference frame, joint order, sign or unit, or a missing term. Exit code 0: all results
+    agree; 1: they do not; 3: no oracle can check the robot.
     """
     from urdfkin.validation.functions import verify_function  # noqa: PLC0415  keeps --help fast
     from urdfkin.validation.programs import Program  # noqa: PLC0415
@@ -170,14 +176,14 @@ def _quantity_of(function: str) -> str:
     name = _stated(function)
     if name is None:
         raise click.UsageError(
-            f"the name of the function {function!r} states no quantity; pass --quantity, one of"
-            f" {', '.join(_QUANTITIES)}"
+            f"the name of the function {function!r} contains no quantity; pass --quantity NAME, where"
+            f" NAME is one of {', '.join(_QUANTITIES)}"
         )
     return name
 
 
 def _stated(function: str) -> str | None:
-    """Return the quantity that a function's name states: `jacobian_rate_of_tool0` states jacobian-rate."""
+    """Return the quantity in a function's name: "jacobian-rate" for `jacobian_rate_of_tool0`."""
     names = sorted(_QUANTITIES, key=len, reverse=True)
     return next((name for name in names if name.replace("-", "_") in function), None)
 
@@ -185,7 +191,7 @@ def _stated(function: str) -> str | None:
 def _functions(target: str) -> dict[str, Callable[..., object]]:
     """Return the function of FILE.py:FUNCTION.
 
-    For FILE.py, return each function that has the name of a quantity.
+    For FILE.py without a function's name, return each function whose name contains a quantity.
     """
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
@@ -216,13 +222,14 @@ def _module(path: str) -> ModuleType:
     file = Path(path).resolve()
     if not file.is_file():
         raise SourceError("no such file", where=path)
-    name = f"_urdfkin_checks_{file.stem}"  # its own name could be the name of a library
+    name = f"_urdfkin_checks_{file.stem}"  # not `file.stem`, which could be the name of an installed module
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    # The folder is the last one on the path, so that no file in it hides an installed module.
+    # Append the file's folder to the end of sys.path, so that no file in the folder hides an installed
+    # module.
     sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)

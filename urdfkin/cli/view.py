@@ -55,9 +55,10 @@ def command(
 ) -> None:
     """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
 
-    The viewer starts at --q. Without --q, it starts in the configuration within the limits nearest to zero.
-    Pinocchio checks the numbers of the chosen frame as the robot moves. The viewer needs the package viser.
-    Ctrl-C stops it.
+    The viewer starts at --q. Without --q, the viewer starts in the configuration nearest to zero that is
+    within the joint limits. The viewer shows the position, velocity and other numbers of the frame that you
+    choose. Pinocchio checks these numbers again after each motion of the robot. The viewer needs the package
+    viser. Ctrl-C stops it.
 
     With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file. With
     --convention, the input field of q also accepts and shows values in that convention.
@@ -83,7 +84,7 @@ def command(
     if trajectory is not None:
         if begin is not None:
             raise click.UsageError(
-                "--q and --trajectory cannot be used together: a trajectory has its own start"
+                "--q and --trajectory cannot be used together: a trajectory begins at its first sample"
             )
         played = read_motion(loaded, trajectory, convention)
         if played.base is not None:
@@ -98,7 +99,7 @@ def command(
         Viewer(server, loaded, None if begin is None else begin[0], played, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # otherwise a pipe gets the address only when the viewer stops
+        sys.stdout.flush()  # otherwise a pipe gets the address too late
         wanted = sys.stdout.isatty() and has_screen() if browser is None else browser
         with opened_page(server.address) if wanted else nullcontext():
             server.sleep_forever()
