@@ -1147,7 +1147,7 @@ class _Reader:
                 self._say(
                     "unused-in-usd",
                     edge.path,
-                    "a lower limit without an upper one, or the reverse; a URDF has both or none, so it has none",
+                    "only a lower or only an upper limit; a URDF has both or none, so it has none",
                 )
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
