@@ -68,7 +68,7 @@ _OTHERS = 1
 #: Limit for the QR decomposition J = Q R of the Jacobian J. If a diagonal entry of R is at most this fraction
 #: of the largest entry of R, the columns of J are linearly dependent.
 _DEPENDENT = 1e-12
-#: Divisors of the robot's size. The quotients are the coordinates of a target that lies on no joint axis.
+#: The robot's size divided by these numbers gives the coordinates of a target that lies on no joint axis.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: `ParametricChain.rounding` is multiplied by this factor for the comparison with Pinocchio. Pinocchio's
 #: result has more rounding errors. Pinocchio computes the poses of base and tip separately. It reads the
@@ -92,7 +92,7 @@ class Calibration:
         identification: The parameters that are identifiable from the measured poses.
         general: The parameters that are identifiable from random poses.
         fitted: The fit; None without poses.
-        before: The fit of base and tool alone, with the robot's original parameters.
+        before: The fit of only base and tool, with the robot's original parameters.
         odd: Indices of those poses that are outliers.
         without_odd: The fit without the outliers.
         weak: Indices of poorly observable parameters, each with a ratio of uncertainties. The ratio is the
@@ -360,7 +360,7 @@ def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
 def _check_measured(
     robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measured]:
-    """Return the path's coordinates (s, c) of all samples, and the measurements."""
+    """Check `q` and `poses`; return the path's coordinates (s, c), and the poses as `Measured`."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.checked(q, "q")
@@ -579,7 +579,8 @@ def _list(names: Iterable[str]) -> str:
     return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")
 
 
-#: Largest error of a rotation matrix, or of a quaternion's length, that counts as rounding of digits.
+#: A rotation matrix, or the length of a quaternion, may have this error, because a file contains rounded
+#: digits.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
