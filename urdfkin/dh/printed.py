@@ -62,8 +62,8 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     base, tool = (_pose(T, digits) for T in (table.base, table.tool))
     bounds = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
     q = values_within([bounds.get(name, UNKNOWN) for name in table.joint_names], SAMPLES)
-    # A DHTable accepts only exact rotations in base and tool.
-    # Therefore, the rounded base and tool are not in the table but are multiplied separately.
+    # A DHTable accepts only exact rotations in base and tool. Therefore, the table here has no base and tool,
+    # and the code multiplies by the rounded base and tool.
     between = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)

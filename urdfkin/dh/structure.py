@@ -16,7 +16,8 @@ with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF
 frames, the zero positions and the positive directions of the joints are the same as in the OPW table. The OPW
 parameters are read from the derived table. OPW has no parameter for the small tilts of a calibrated arm, so
 `opw_of` ignores these tilts. `Opw.placement` computes the solver's forward kinematics with the OPW
-parameters. The difference from the arm's placement is the error of the OPW parameters.
+parameters. The error of the OPW parameters is the difference between this pose and the pose that urdfkin
+computes for the arm.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
@@ -108,7 +109,7 @@ class Structure:
         kinds: Properties that the path has exactly or approximately, in ascending order of the deviation.
         reach: Upper bound of the tip's distance (metres) from a point of the first axis. The point is the one
             nearest to the second axis.
-        reached: Largest distance of the tip from the same point on samples (metres).
+        reached: Largest distance of the tip from this point in sampled configurations (metres).
         solvers: Closed-form solutions, with libraries that implement them.
     """
 
@@ -324,7 +325,7 @@ class Opw:
         offsets: Constant `offset` of each joint (rad).
         signs: Factor `sign` of each joint, +1 or -1.
         base: (4, 4) pose of the solver's base in the URDF's base.
-        tool: (4, 4) pose of the URDF's tip in the solver's flange.
+        tool: (4, 4) pose of the URDF's tip in the solver's flange frame.
     """
 
     joints: tuple[str, ...]
@@ -440,9 +441,9 @@ def _read(table: DHTable) -> Opw:
 
 
 def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axes H (n, 3), and the steps P (n + 1, 3) between points on these axes, in metres.
+    """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) between points on these axes, in metres.
 
-    The first step begins at the base, and the last step ends at the tip.
+    The first vector begins at the base, and the last vector ends at the tip.
 
     Args:
         screws: A path of revolute joints.

@@ -21,11 +21,12 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: If at most this error remains after a change of cells, the change explains the whole difference. The unit
-#: is rad for angles, and metres per metre of reach for positions. The rounding errors of a fit are far
-#: smaller than this number. The last digits in data sheets are far larger.
+#: If at most this error remains after a change of cells, these cells are the only difference between table
+#: and URDF. The unit is rad for angles, and metres per metre of reach for positions. The rounding errors of a
+#: fit are far smaller than this number. The last digits in data sheets are far larger.
 EXPLAINED = 1e-9
-#: Finest resolution of printed fitted numbers: rad for angles, metres per metre of reach for lengths.
+#: Fitted numbers are rounded to this resolution or coarser before they are printed. The unit is rad for
+#: angles, and metres per metre of reach for lengths.
 _FINEST = 1e-12
 #: Half a unit of the last digit, with a margin for the rounding of decimal numbers to doubles.
 _HALF = 1.0 + 1e-6
@@ -164,8 +165,9 @@ class Comparison:
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
             fitted. The list is empty if such changes do not explain the difference, or if too many cells
             would have to change.
-        hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. A
-            change of base, tool or joint offsets has the same effect on the tip as a change of this cell.
+        hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. Base,
+            tool and joint offsets can change so that the tip's poses are the same as after a change of this
+            cell.
         mistakes: The likely mistakes. After the correction of a likely mistake, the fewest parameters must be
             fitted.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
@@ -407,7 +409,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
     """Format an offset at the resolution `fine`.
 
-    The offset is written as a fraction of pi if the two are equal at this resolution.
+    If an angle differs from a multiple of 15 degrees by at most `fine`, it is written as a fraction of pi.
     """
     if abs(offset) <= fine:
         return "0"
