@@ -217,7 +217,7 @@ class Model:
         return found
 
     def table(self, at: FloatArray) -> DHTable | None:
-        """Return the table with its parameters set to `at`, or None if the model is a URDF's."""
+        """Return the table with the parameters `at`; None if the model describes a URDF."""
         if not isinstance(self.source, DHTable):
             return None
         cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.way.parameters) if not p.end}

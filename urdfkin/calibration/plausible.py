@@ -45,7 +45,7 @@ _HARDLY_BELOW = 0.7
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
 #: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
-#: Two configurations count as one if their joint values (rad, m) differ by less than this number.
+#: Two configurations are treated as one if their joint values (rad, m) differ by less than this number.
 _ONE_CONFIGURATION = 1e-6
 #: urdfkin subtracts this number of standard deviations from a change, and compares the rest with the limit.
 #: The reason is that the tilt of an axis near the target is poorly observable.

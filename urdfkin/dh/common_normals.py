@@ -485,14 +485,14 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Largest angle (radians) and length (metres) that count as rounding errors in a constant pose."""
+    """Largest angle (radians) and length (metres) that are treated as rounding errors in a constant pose."""
 
     radians: float
     metres: float
 
 
 def noise_of(joints: int, length: float, reach: float) -> Noise:
-    """Return the largest angle and the largest length that count as rounding errors in a constant pose.
+    """Return the largest angle and length that are treated as rounding errors in a constant pose.
 
     Args:
         joints: Number of URDF joints whose origins are multiplied to give the constant pose.
@@ -518,7 +518,7 @@ def noises(chain: FrameChain, reach: float) -> list[Noise]:
 def left_out(chain: FrameChain) -> float:
     """Return the sum (rad) of those tilts between consecutive axes that are not larger than rounding errors.
 
-    The sum contains the tilts of z axes and of x axes.
+    Tilts of z axes and tilts of x axes are both added.
     """
     found = 0.0
     for A, noise in zip(chain.constants, noises(chain, 0.0), strict=True):

@@ -55,7 +55,7 @@ class Last(StrEnum):
 
 
 class First(StrEnum):
-    """Whether the cells d_1 and theta_1 or the pose `base` contain the transform to the first joint."""
+    """Where the transform from the base to the first joint is: in the cells d_1 and theta_1, or in `base`."""
 
     BASE = "base"
     JOINT = "joint"

@@ -32,7 +32,7 @@ from urdfkin.model.tree import KinematicTree
 #: angles, and relative to the reach for lengths. Two zero positions of a joint are different if their angles
 #: differ by more than `_OTHER`.
 _ANOTHER, _OTHER = 0.1, 1e-2
-#: Two cells with a smaller difference (relative to the reach, or in rad) count as equal.
+#: Two cells with a smaller difference (relative to the reach, or in rad) are treated as equal.
 _ROUNDING = 1e-12
 
 

@@ -91,7 +91,7 @@ def acceleration(
 
 
 def _joint_derivatives(table: DHTable, rates: Given, what: str) -> FloatArray:
-    """Convert velocities or accelerations of the coordinates to those (..., rows) of all joints."""
+    """Convert velocities (or accelerations) of the coordinates to velocities (..., rows) of all joints."""
     return table.coupling.checked(rates, what) @ table.coupling.matrix.T
 
 

@@ -108,7 +108,7 @@ def from_sheet(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column: its name ("" if unknown), its heading, its unit, and whether the heading contains i-1."""
+    """A column of a table in text; `previous` says whether the heading contains i-1."""
 
     name: str
     heading: str = ""

@@ -3,7 +3,7 @@
 The rounding error of an angle rotates the rest of the chain. This rotation moves the tip by at most the error
 times the sum of all later lengths. The rounding error of a length shifts the rest of the chain. The sum of
 these effects is a bound of the tip error for every configuration within the limits. The module also computes
-the largest error on samples.
+the largest error in sampled configurations.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class PrintedPrecision:
 
     Attributes:
         digits: Number of printed significant digits.
-        metres: Largest distance on samples between the tip of the printed table and the tip of the exact
-            table (metres).
+        metres: Largest distance (metres), in sampled configurations, between the tip of the printed table and
+            the tip of the exact table.
         bound: Guaranteed bound (metres) of this distance at all joint values within the limits; None if there
             is no bound.
         samples: Number of samples.

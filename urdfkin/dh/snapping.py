@@ -96,7 +96,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
 def statement(
     exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float
 ) -> SnapReport:
-    """Return the sum of the bounds of all changes, and the largest effect of the changes on samples."""
+    """Return the sum of the bounds of all changes, and their largest effect in sampled configurations."""
     radians = sum((change.angle for change in changes), 0.0)
     per_metre = dict[str, float]()
     for change in changes:
@@ -245,7 +245,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is Convention.STANDARD else k
 
 
-#: Assumed range of the coordinate of a mimicked joint that is not on the path (rad or metres).
+#: If a mimicked joint is not on the path, its coordinate is assumed to be in this range (rad or metres).
 UNKNOWN = (-1.0, 1.0)
 
 

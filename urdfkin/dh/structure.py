@@ -48,11 +48,11 @@ from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind
 
-#: Largest deviations (rad, metres) of a property that is reported, for example parallel axes.
-#: The property counts as exact if its deviations are at most `EXACT` (rad and metres).
+#: Largest deviations (rad, metres) of a property that is reported, for example parallel axes. The property is
+#: reported as exact if its deviations are at most `EXACT` (rad and metres).
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
-#: Singular values of the Jacobian below this limit count as zero.
-#: Rounding errors are far smaller, and the distances of real axes are far larger.
+#: Singular values of the Jacobian below this limit are treated as zero. Rounding errors are far smaller, and
+#: the distances of real axes are far larger.
 _RANK = 1e-6
 #: Number of random configurations within the limits for the estimate of the reach; mimic rules are ignored.
 _SAMPLES = 2000
@@ -106,7 +106,8 @@ class Structure:
         joints: R or P for each joint.
         freedoms: Degrees of freedom of the tip: the Jacobian's rank at a random configuration.
         pairs: Angle and distance of each pair of consecutive axes.
-        kinds: Properties that the path has exactly or approximately, in ascending order of the deviation.
+        kinds: Exact and approximate properties of the path; the property with the smallest deviation is
+            first.
         reach: Upper bound of the tip's distance (metres) from a point of the first axis. The point is the one
             nearest to the second axis.
         reached: Largest distance of the tip from this point in sampled configurations (metres).
@@ -427,8 +428,8 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 def _read(table: DHTable) -> Opw:
     """Return the OPW parameters of an arm.
 
-    The input is a table of the arm that has the frames of the OPW table. Cells without a corresponding OPW
-    parameter are ignored.
+    The frames of `table` must be the frames of the OPW table. The function ignores cells without a
+    corresponding OPW parameter.
     """
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}

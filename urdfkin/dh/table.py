@@ -16,8 +16,9 @@ is the constant in the row plus `sense` times the joint's value. The standard co
 z_{i-1} is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
 Snapping replaces angles by multiples of 15 degrees. `SnapReport` states the effect of snapping on the tip: a
-guaranteed bound, and the largest effect on samples. A rotation by a small angle about a joint's origin moves
-the tip by at most that angle times the tip's distance from the origin. This distance is at most the path
+guaranteed bound, and the largest effect in sampled configurations. A rotation by a small angle about a
+joint's origin moves the tip by at most that angle times the tip's distance from the origin. This distance is
+at most the path
 length: the sum of the constant offsets from that origin to the tip, plus the travel of the prismatic joints.
 The sum of the bounds of all changes is valid for every configuration.
 """
@@ -166,8 +167,8 @@ class DHRow:
         return along_axis(self.theta, self.d)
 
 
-#: Largest difference between a handwritten angle and the multiple of 15 degrees that it looks like.
-#: The unit of the difference is 15 degrees.
+#: Largest difference between a handwritten angle and the multiple of 15 degrees that it looks like. The
+#: difference is divided by 15 degrees.
 _WRITTEN = 1e-3
 
 

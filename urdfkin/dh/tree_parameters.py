@@ -365,7 +365,7 @@ def _headings(table: TreeParameters, units: Units) -> list[str]:
 def _cells(table: TreeParameters, j: int, units: Units) -> list[str]:
     row = table.rows[j]
     theta, r = units.angle(row.theta), units.length(row.r)
-    # The constant in a mimic joint's cell includes the offset of the mimic rule, as in all tables.
+    # The constant in a mimic joint's cell includes the offset of the mimic rule.
     own = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
     if row.sigma == 0:
         theta = added(own, units.angle(row.theta + row.offset))

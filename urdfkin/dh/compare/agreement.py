@@ -51,8 +51,8 @@ _EXPLAINS = 0.5
 _LEFT = 0.05
 #: Smallest change of a cell that is reported, relative to the reach. It is a tenth of `EXPLAINED`.
 _MOVED = 1e-10
-#: A tip that moves by less than this fraction of the path length counts as fixed. For such a tip, the reach
-#: is the length of the path.
+#: A tip that moves by less than this fraction of the path length is treated as fixed. For such a tip, the
+#: reach is the length of the path.
 _FIXED_TIP = 1e-6
 #: Range in which a prismatic joint without limits is sampled (metres).
 _SLIDE = (-0.5, 0.5)
@@ -166,7 +166,7 @@ def _reach(chain: FrameChain, wanted: FloatArray) -> float:
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
-    """Check that a table and a path have the same number and kinds of joints, and at least one.
+    """Check that a table and a path have the same number (at least one) and the same kinds of joints.
 
     Raises:
         InputError: the joints are different.
@@ -228,10 +228,10 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
     """Return the index of the row that contains a cell in the reference table.
 
-    In a standard table, row i contains this cell.
+    In a standard table, row i contains the cell.
 
-    A modified table contains a, alpha and beta of row i in row i + 1. If no row contains the cell, the result
-    is the number of rows.
+    In a modified table, the cells a, alpha and beta of the standard row i are in row i + 1. If no row
+    contains the cell, the result is the number of rows.
     """
     return i + (reference.convention is Convention.MODIFIED and cell not in ("theta", "d"))
 

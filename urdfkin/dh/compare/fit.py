@@ -227,7 +227,7 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
 def _sparse(
     model: Model, start: Model, freedoms: FloatArray, cells: FloatArray, error: FloatArray, scale: float
 ) -> FloatArray:
-    """Return the changes of cells that remove the error left by the free parameters.
+    """Return the changes of cells that remove the error which remains after the fit of the free parameters.
 
     After these changes, as few cells as possible differ from the cells of `start`.
     """
@@ -457,7 +457,8 @@ REVERSAL = 1e-9
 #: A prismatic axis can be shifted freely. Differences of lengths next to such an axis are therefore
 #: multiplied by this small weight.
 _SLIDING = 1e-3
-#: Parallel axes with a smaller distance (metres) count as coinciding. The direction of x is then free.
+#: Parallel axes with a smaller distance (metres) are treated as coinciding. The direction of x can then be
+#: chosen.
 _NO_OFFSET = 1e-5
 #: Two candidates are equal if their numbers (metres, radians) agree after rounding to this number of
 #: decimals.

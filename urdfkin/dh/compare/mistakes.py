@@ -26,7 +26,7 @@ from urdfkin.kinematics.rotation import log_rotation, polar_factor
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
-#: Two angles with a smaller difference (rad) count as equal.
+#: Two angles with a smaller difference (rad) are treated as equal.
 _SAME_ANGLE = 1e-9
 #: If there are more possible changes of the table than this number, joint offsets and joint signs are not
 #: fitted. A table of nine rows has about this number of possible changes.

@@ -42,8 +42,7 @@ class CellDifference:
         cell: "a", "alpha", "d", "theta" or "beta".
         reference: The table's value (metres or radians).
         urdf: The URDF's value (metres or radians).
-        tip: Displacement (metres) of the tip that this difference alone causes, at the sample with the
-            largest displacement.
+        tip: Largest displacement (metres) of the tip in the sampled configurations if only this cell differs.
         last_digit: Half a unit of the value's last digit in the table's file (metres or radians). 0 if the
             value is exact, or if its text is unknown.
     """
@@ -151,15 +150,16 @@ class Comparison:
         offsets: Offset of each joint (radians or metres).
         base: Distance and angle by which the fit moved the base.
         tool: Distance and angle by which the fit moved the tool.
-        metres: Largest position error (metres) of the tip on all samples, for the fitted table.
-        radians: Largest orientation error (radians) of the tip on all samples, for the fitted table.
+        metres: Largest position error (metres) of the fitted table's tip in all sampled configurations.
+        radians: Largest orientation error (radians) of the fitted table's tip in all sampled configurations.
         most_metres: Proven upper bound (metres) of the tip's position error for all joint values and the
             fitted table. The bound does not include rounding errors (`urdfkin.dh.compare.agreement`).
         most_radians: Proven upper bound (radians) of the tip's orientation error for all joint values and the
             fitted table. The bound does not include rounding errors.
-        written_metres: Largest position error (metres) of the tip on all samples, for the unfitted table.
-        written_radians: Largest orientation error (radians) of the tip on all samples, for the unfitted
-            table.
+        written_metres: Largest position error (metres) of the unfitted table's tip in all sampled
+            configurations.
+        written_radians: Largest orientation error (radians) of the unfitted table's tip in all sampled
+            configurations.
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
@@ -171,7 +171,7 @@ class Comparison:
         mistakes: The likely mistakes. After the correction of a likely mistake, the fewest parameters must be
             fitted.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
-            cells explain the whole difference, only rounding errors remain.
+            cells are the only difference, the remaining error is only rounding.
         tolerance: Tolerance at the tip (metres).
         samples: Number of configurations at which the fitted table was checked.
     """
@@ -199,7 +199,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the table agrees with the URDF on all samples.
+        """Whether the table agrees with the URDF in all sampled configurations.
 
         The table agrees if the position error, and the orientation error multiplied by the reach, are within
         `tolerance`.
@@ -213,7 +213,7 @@ class Comparison:
 
     @property
     def rounding(self) -> float:
-        """Error that counts as rounding: radians for angles, metres per metre of reach for lengths."""
+        """Limit below which errors are treated as rounding: radians, or metres per metre of reach."""
         return EPS * of_a_fit(len(self.reference.rows))
 
     @property

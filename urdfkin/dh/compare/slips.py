@@ -54,8 +54,9 @@ class CommonMistake:
     Attributes:
         reading: The interpretation with which the table agrees with the URDF.
         said: The interpretation that the table's file states.
-        metres: Position error of the tip at the worst sample, after a fit of base, tool and offsets.
-        radians: Orientation error of the tip at the worst sample.
+        metres: Largest position error of the tip in the sampled configurations, after a fit of base, tool and
+            offsets.
+        radians: Largest orientation error of the tip in the sampled configurations, after this fit.
     """
 
     reading: ConventionHypothesis
@@ -230,7 +231,7 @@ class ConventionHypothesis:
     def slips(self, other: ConventionHypothesis) -> int:
         """Return the number of differences between two interpretations.
 
-        Two exchanged columns count as one difference.
+        Two exchanged columns are counted as one difference.
         """
         moved = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
         return len(self._differences(other)) + (moved + 1) // 2
