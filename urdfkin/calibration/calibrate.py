@@ -346,7 +346,7 @@ def fitted_model(
 def _general_target(model: Model) -> FloatArray:
     """Return the model's parameters (p,).
 
-    If the target is fitted, its position is away from all joint axes.
+    If the target's position is fitted, it is set to a point on no joint axis.
     """
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):

@@ -145,14 +145,14 @@ def choices_of(
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
     """Return the table of a chain.
 
-    The product base . rows . tool equals the chain's placement for every q, except for rounding.
+    The product base . rows . tool equals the pose of the chain's tip for every q, except for rounding.
 
     Args:
         chain: The path.
         choices: The options.
         like: A standard table of the same joints. The result has the same directions of x and the same
             offsets along parallel axes. The zero positions of the first and the last joint are also the same.
-            These have priority over `choices`.
+            If `like` and `choices` contradict each other, `like` is used.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))

@@ -301,7 +301,7 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the tip's positions at samples within the limits, and the Jacobian at the first sample."""
+    """Return the tip's positions in random configurations, and the Jacobian in the first of them."""
     ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
     values = values_within(ranges, _SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]

@@ -433,9 +433,9 @@ def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, floa
 
 
 def _opposite_rotations(model: Model) -> list[Model]:
-    """Return models in which two consecutive joint offsets are rotated by opposite angles.
+    """Return models with an angle added to one joint offset and subtracted from the next joint offset.
 
-    If two consecutive axes nearly coincide, such a change has little effect on the tip.
+    If the axes of the two joints nearly coincide, this change has little effect on the tip.
     """
     found = []
     for i in range(len(model.cells) - 1):

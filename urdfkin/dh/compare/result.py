@@ -163,13 +163,13 @@ class Comparison:
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
-            fitted. The list is empty if such changes do not explain the difference, or if too many cells
+            fitted. The list is empty if changes of cells do not remove the tip error, or if too many cells
             would have to change.
         hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. Base,
             tool and joint offsets can change so that the tip's poses are the same as after a change of this
             cell.
-        mistakes: The likely mistakes. After the correction of a likely mistake, the fewest parameters must be
-            fitted.
+        mistakes: The likely mistakes. A mistake is likely if its correction leaves the smallest number of
+            parameters to fit.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
             cells are the only difference, the remaining error is only rounding.
         tolerance: Tolerance at the tip (metres).
