@@ -30,10 +30,10 @@ and r the weighted residuals. The covariance of the parameters is
 The hat matrix is H = J C J^T. The redundancy of measurement i is 1 - H_ii.
 
 Noise that you do not state is estimated from the residuals, separately for positions and rotations. The
-variance of the positions is a quotient. The numerator is the sum of the squared position residuals. The
-denominator is the sum of the redundancies 1 - H_ii of the measured position coordinates. The variance of the
-rotations is computed in the same way. This estimate is repeated until it is constant (Foerstner's variance
-components).
+variance of the positions is estimated as a quotient. The numerator is the sum of the squared position
+residuals. The denominator is the sum of the redundancies 1 - H_ii of the measured position coordinates. The
+variance of the rotations is computed in the same way. This estimate is repeated until it is constant
+(Foerstner's variance components).
 
 A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a correct pose this number is chi^2
 distributed, with 3 degrees of freedom for a position and 6 for a full pose. The limit is chosen so that only
@@ -172,7 +172,7 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
 
 #: If the sum of all redundancies is below this number, the fit cannot be checked.
 _ONE_OR_MORE = 0.5
-#: Smallest eigenvalue of the matrix 1 - H_ii that is not replaced by zero, relative to its largest
+#: An eigenvalue of the matrix 1 - H_ii is replaced by zero if it is below this fraction of the largest
 #: eigenvalue. If a pose has an error along an eigenvector with a smaller eigenvalue, the residuals do not
 #: show this error.
 _FOLLOWED = 1e-9

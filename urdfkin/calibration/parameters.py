@@ -63,13 +63,12 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Drive(Motion):
-    """A rotation about, or a translation along, a coordinate axis, by a parameter or by a joint's value.
+    """A motion whose angle or length is a parameter or a joint's value.
 
     Attributes:
-        parameter: Index of the parameter that is the angle or length, or index of the joint's gain. None for
-            a joint without a gain.
-        joint: Index of the joint whose value is the angle or length. None if a parameter is the angle or
-            length.
+        parameter: Index of the parameter that gives the angle or length. For the motion of a joint: index of
+            the joint's gain, or None without a gain.
+        joint: Index of the joint whose value gives the angle or length. None if a parameter gives it.
         sense: -1 if the path leads from the joint's child to its parent, or if the table's row subtracts the
             joint's value.
     """
@@ -161,13 +160,13 @@ PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: The six parameters of an origin, in the order of multiplication. Each entry contains a name, True for a
-#: rotation, and the index of the coordinate axis.
+#: The six parameters of an origin, in the order of multiplication. Each entry contains the name, whether the
+#: motion is a rotation, and the index of the coordinate axis.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order of preference among parameters with the same effect. The key True contains the order for revolute
-#: joints, and the key False the order for prismatic joints. The joint's zero comes first, then motions of the
-#: joint's axis, then motions of the joint's frame alone.
+#: Order of preference among parameters with the same effect. The key is True for revolute joints, and False
+#: for prismatic joints. The joint's zero comes first, then motions of the joint's axis, then motions of the
+#: joint's frame alone.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")

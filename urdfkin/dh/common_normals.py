@@ -54,12 +54,13 @@ from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUM
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Two axes with a smaller tilt (rad) are nearly parallel. If a number in the URDF has an error, the position
-#: of their common normal has more than 100 times this error.
+#: Two axes with a smaller tilt (rad) are nearly parallel. If a number in the URDF has an error, the error of
+#: their common normal's position is more than 100 times as large.
 NEARLY_PARALLEL = 1e-2
 
 #: Two axes with a larger tilt (rad) are never treated as nearly parallel. If the tilt is between
-#: `NEARLY_PARALLEL` and this number, the distance of the common normal decides.
+#: `NEARLY_PARALLEL` and this number, the axes are treated as nearly parallel only if their common normal is
+#: far away.
 FAR_FEET = 0.35
 
 
@@ -267,8 +268,7 @@ class PairLike:
     def passes_on(self) -> bool:
         """Whether the two axes do not determine the row's offset d.
 
-        If the axes do not determine d, then d can be chosen, and the offset of the next row compensates the
-        choice.
+        In this case, d can be chosen, and the offset of the next row compensates the choice.
         """
         return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
 
@@ -298,8 +298,8 @@ class PairLike:
         The next axis intersects the plane in a point. In the other table, the cell a is the distance of this
         point from the first axis. The component of a in the direction of the tilt determines the position of
         the plane. The position error is then the rounding error divided by the tilt. For a slight tilt,
-        urdfkin computes this component from a and the component normal to the tilt, which is more accurate.
-        The result is None if the plane is farther away than `reach`.
+        urdfkin computes this component from a and from the component normal to the tilt. This formula is then
+        more accurate. The result is None if the plane is farther away than `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)
@@ -343,7 +343,7 @@ def steps_like(
 ) -> tuple[list[Step], list[float]]:
     """Compute the transforms between consecutive axes of a path.
 
-    The function copies numbers that can be chosen freely from another table.
+    If a number can be chosen freely, the function copies the number from another table.
 
     Args:
         pairs: All pairs of consecutive axes.

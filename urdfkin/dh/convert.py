@@ -6,10 +6,10 @@ The standard and the modified convention group the same factors S and X of `urdf
     modified   base' . (X_0 S_1) (X_1 S_2) ... (X_{n-1} S_n) . tool'
 
 The conversion to the modified convention moves X_n into the tool. The conversion to the standard convention
-moves X_0 into the base. The cells a and alpha of the first modified row come from no standard row. If the
-base is a product Tx(a) Rx(alpha), the conversion writes a and alpha into these two cells, and the base
-becomes the identity. The conversion to the standard convention writes a tool Tx(a) Rx(alpha) into the last
-row in the same way. Therefore, conversion to the other convention and back gives the original table.
+moves X_0 into the base. No standard row contains the cells a and alpha of the first modified row. If the base
+is a product Tx(a) Rx(alpha), the conversion writes a and alpha into these two cells, and the base becomes the
+identity. In the conversion to the standard convention, a tool of the form Tx(a) Rx(alpha) is written into the
+last row. Therefore, conversion to the other convention and back gives the original table.
 
 In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
 i, so the frame of joint i is frame i - 1. The pose of frame i in frame i - 1 is S_i X_i. If the joint is at

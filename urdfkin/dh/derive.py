@@ -81,7 +81,7 @@ class Slide(StrEnum):
 
 
 class ParallelOffset(StrEnum):
-    """Which row of consecutive parallel axes contains the offset along them."""
+    """For consecutive parallel axes: the row that contains the offset along these axes."""
 
     LAST = "last"
     FIRST = "first"

@@ -147,9 +147,9 @@ def dh_table(
             angle as it is in the file.
         last: "tip": the last row reaches the tip if four parameters suffice. "flange": the tool contains the
             transform from the last axis to the tip.
-        parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the last of
-            these rows contains the sum of the offsets. "first": the first of these rows contains the sum.
-            "each": every row contains the offset of its own link.
+        parallel_offset: For consecutive parallel axes: the row that contains the offset along these axes.
+            "last": the last of these rows contains the sum of the offsets. "first": the first of these rows
+            contains the sum. "each": every row contains the offset of its own link.
         flip: Names of joints whose positive direction is reversed. The attribute `sense` of their rows is -1.
         first: "base": if possible, d_1 and theta_1 contain the transform from the base to the first axis.
             "joint": the base contains this transform, so that d_1 and theta_1 are zero (Craig's frame 0).

@@ -96,7 +96,7 @@ def _joint_derivatives(table: DHTable, rates: Given, what: str) -> FloatArray:
 
 
 def _flat(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Return the batch shape of the arrays, and the arrays after broadcasting, each with shape (n, rows)."""
+    """Broadcast the arrays; return their common batch shape, and the arrays with shape (n, rows)."""
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     rows = len(table.rows)
     wide = [np.broadcast_to(array, (*shape, rows)).reshape(math.prod(shape), rows) for array in arrays]

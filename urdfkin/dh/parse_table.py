@@ -395,7 +395,7 @@ def _unescaped(name: str) -> str:
 
 
 def _nested(row: dict[str, Any]) -> dict[str, Any]:
-    """Put the columns of a mimic rule into the mapping `mimic`, and those of limits into `limit`.
+    """Put the cells of a mimic rule into a mapping `mimic`, and the cells of limits into a mapping `limit`.
 
     If the row has no mimic rule, `offset` is added to theta or d.
     """

@@ -18,7 +18,8 @@ joint values in SI units. An effort is in N or N m.
 
 `last_digits` returns the precision of each number as it is written: half a unit of its last digit. For
 example, 311.1 mm in a data sheet is uncertain by 0.05 mm. A number without a decimal point (90 degrees, zero)
-and a multiple of pi are exact. However, a whole number of millimetres is treated as a rounded length.
+and a multiple of pi are exact. However, a whole number of millimetres is not treated as exact: it is
+uncertain by 0.5 mm.
 """
 
 from __future__ import annotations

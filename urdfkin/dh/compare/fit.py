@@ -494,17 +494,17 @@ class _Partial:
     """An alignment of the first joints of the chain, which will be extended joint by joint.
 
     Attributes:
-        cost: Sum of the differences between the cells of the two tables, for the rows before the last of
-            these joints (metres).
+        cost: Sum of the differences between the cells of the two tables (metres), for all rows before the row
+            of the last joint.
         senses: Sign (+1 or -1) of each of these joints.
         offsets: Offsets of these joints except the last joint.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
         carry: Offset along z from the last joint's DH frame to its URDF frame (metres).
-        base: (4, 4) transform by the first row's offset, which becomes part of the base.
-        absorber: Index of a row whose joint offset can be chosen freely, and a sign; None if there is no such
-            row. If axes before the last joint coincide, only the sum of their joint angles is defined, so one
-            joint offset can be chosen. The sign says in which direction this joint offset rotates x. If the
-            index is 0, the joint offset is part of the base.
+        base: (4, 4) transform that becomes part of the base, instead of an offset in the first row.
+        absorber: (row index, sign) for a row whose joint offset can be chosen freely. None if no joint offset
+            can be chosen. If axes before the last joint coincide, only the sum of their joint angles is
+            defined, so one joint offset can be chosen. The sign says in which direction this joint offset
+            rotates x. If the index is 0, the joint offset is part of the base.
     """
 
     cost: float
@@ -618,8 +618,8 @@ def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, 
 def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
     """Set theta of a prismatic joint to theta in the reference table.
 
-    The joint offset of the row in `partial.absorber` changes by the difference of the two angles. If
-    `partial.absorber` is None, the alignment is unchanged.
+    The joint offset of the row in `partial.absorber` changes by the difference between the old and the new
+    theta. If `partial.absorber` is None, the alignment is unchanged.
     """
     if partial.absorber is None:
         return partial

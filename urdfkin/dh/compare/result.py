@@ -25,8 +25,8 @@ Parts = list[str | Table | Matrix]
 #: and URDF. The unit is rad for angles, and metres per metre of reach for positions. The rounding errors of a
 #: fit are far smaller than this number. The last digits in data sheets are far larger.
 EXPLAINED = 1e-9
-#: Fitted numbers are rounded to this resolution or coarser before they are printed. The unit is rad for
-#: angles, and metres per metre of reach for lengths.
+#: Fitted numbers are printed with this resolution, or with a coarser resolution. The unit is rad for angles,
+#: and metres per metre of reach for lengths.
 _FINEST = 1e-12
 #: Half a unit of the last digit, with a margin for the rounding of decimal numbers to doubles.
 _HALF = 1.0 + 1e-6
@@ -165,9 +165,8 @@ class Comparison:
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
             fitted. The list is empty if changes of cells do not remove the tip error, or if too many cells
             would have to change.
-        hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. Base,
-            tool and joint offsets can change so that the tip's poses are the same as after a change of this
-            cell.
+        hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. If such
+            a cell has another value, base, tool and joint offsets can compensate for the difference.
         mistakes: The likely mistakes. A mistake is likely if its correction leaves the smallest number of
             parameters to fit.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these

@@ -1,7 +1,7 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
-An *interpretation* of a table consists of a convention, units and column names. The same numbers, in two
-interpretations, describe robots with two different *shapes*. The shape of a robot consists of three kinds of
+An *interpretation* of a table consists of a convention, units and column names. In each interpretation, the
+numbers of a table describe a robot with a different *shape*. The shape of a robot consists of three kinds of
 numbers: the distances of consecutive axes, the angles between them, and the offsets along the axes. A change
 of joint signs, joint offsets, base or tool does not change the shape. The shape is fast to compute.
 Therefore, urdfkin first computes the shape for each interpretation, and compares it with the URDF's shape. It
