@@ -65,10 +65,10 @@ _WEAK = 10.0
 #: Seed of the random configurations for `Calibration.weak`.
 #: The random configurations for `Calibration.general` have another seed.
 _OTHERS = 1
-#: Limit for the QR decomposition J = Q R of the Jacobian J. If a diagonal entry of R is at most this fraction
-#: of the largest entry of R, the columns of J are linearly dependent.
+#: In the QR decomposition J = Q R of the Jacobian J, a diagonal entry of R may be very small. If it is at
+#: most this fraction of the largest entry of R, the columns of J are treated as linearly dependent.
 _DEPENDENT = 1e-12
-#: Divisors of the robot's size. The quotients are the coordinates of a target that lies on no joint axis.
+#: The robot's size divided by these numbers gives the coordinates of a target that lies on no joint axis.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: `ParametricChain.rounding` is multiplied by this factor for the comparison with Pinocchio. Pinocchio's
 #: result has more rounding errors. Pinocchio computes the poses of base and tip separately. It reads the
@@ -92,13 +92,13 @@ class Calibration:
         identification: The parameters that are identifiable from the measured poses.
         general: The parameters that are identifiable from random poses.
         fitted: The fit; None without poses.
-        before: The fit of base and tool alone, with the robot's original parameters.
+        before: The fit of only base and tool, with the robot's original parameters.
         odd: Indices of those poses that are outliers.
         without_odd: The fit without the outliers.
         weak: Indices of poorly observable parameters, each with a ratio of uncertainties. The ratio is the
-            uncertainty at the measured configurations, divided by the uncertainty at as many random
-            configurations.
-        certificate: Pinocchio's check of the written model.
+            uncertainty at the measured configurations, divided by the uncertainty at the same number of
+            random configurations.
+        certificate: The result of checking the written model with Pinocchio.
         stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters. The other parameters have their original values. If
             all parameters are written, `written_fit` is equal to `fitted`.
@@ -228,16 +228,18 @@ def calibrate(
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
         q: (s, nq) configurations, rad and m; for a table (s, coordinates). None: only report which parameters
             could be identified.
-        poses: (s, 4, 4) poses of the tip in the base, or (s, 3) positions alone, m.
+        poses: (s, 4, 4) poses of the tip in the base, or only the positions (s, 3), m.
         tip: Name of a link or joint; the robot's tip when None.
         base: Name of a link or joint; the robot's base frame when None.
-        fit: Sets of parameters: "base" (pose of the instrument), "tool" (pose of the target on the tip),
-            "offsets" (joint zeros), "origins" (six numbers of each joint of the path; all cells of a table),
-            "gains" (scale factors of joint values).
+        fit: Names of the sets of parameters to fit. "base": the pose of the robot's base in the instrument's
+            frame. "tool": the pose of the target on the tip. "offsets": the zero positions of the joints.
+            "origins": six numbers of each joint origin, or all cells of a table. "gains": the scale factors
+            of the joint values.
         noise: Standard deviations of the measurements, for a position coordinate (m) and for a rotation about
             an axis (rad). None: the noise is estimated from the residuals.
         drop_odd: Whether to exclude outlier poses from the fit; outliers are always reported.
-        complete: Whether you will measure full poses and not only positions; used if `poses` is None.
+        complete: Whether you will measure full poses, and not only positions. This argument is used only if
+            `poses` is None.
         radians: Whether joint angles of more than one turn are in radians, although they look like degrees.
         force: Whether to return a fit even if it is not plausible; `plausibility` then contains the reasons.
             Joint values that look like degrees are refused in any case, unless `radians` is True.
@@ -344,7 +346,7 @@ def fitted_model(
 def _general_target(model: Model) -> FloatArray:
     """Return the model's parameters (p,).
 
-    If the target is fitted, its position is away from all joint axes.
+    If the target's position is fitted, it is set to a point on no joint axis.
     """
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
@@ -360,7 +362,7 @@ def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
 def _check_measured(
     robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measured]:
-    """Return the path's coordinates (s, c) of all samples, and the measurements."""
+    """Check `q` and `poses`; return the path's coordinates (s, c), and the poses as `Measured`."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.checked(q, "q")
@@ -579,7 +581,8 @@ def _list(names: Iterable[str]) -> str:
     return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")
 
 
-#: Largest error of a rotation matrix, or of a quaternion's length, that counts as rounding of digits.
+#: A rotation matrix, or the length of a quaternion, may have this error, because a file contains rounded
+#: digits.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))

@@ -2,9 +2,9 @@
 
 **Identifiability.** A change of parameters cannot be identified if it has no effect on the measurements. Such
 a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
-parameters. This rank is the number of singular values with a lower bound above 0.
-`urdfkin.verify.singular_values` computes this bound by Weyl's inequality from the errors of the columns and
-of the decomposition. You do not have to choose a tolerance.
+parameters. For each singular value, `urdfkin.verify.singular_values` computes a lower bound. The bound takes
+rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
+lower bound. You do not have to choose a tolerance.
 
 The frame of a revolute joint can be shifted along the joint's axis and rotated about it, if the next frame
 compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the joint's
@@ -30,7 +30,8 @@ and r the weighted residuals. The covariance of the parameters is
 The hat matrix is H = J C J^T. The redundancy of measurement i is 1 - H_ii.
 
 Noise that you do not state is estimated from the residuals, separately for positions and rotations. The
-variance of the positions is the sum of their squared residuals divided by the sum of their redundancies. The
+variance of the positions is estimated as a quotient. The numerator is the sum of the squared position
+residuals. The denominator is the sum of the redundancies 1 - H_ii of the measured position coordinates. The
 variance of the rotations is computed in the same way. This estimate is repeated until it is constant
 (Foerstner's variance components).
 
@@ -68,8 +69,9 @@ from urdfkin.verify.singular_values import singular_values
 
 #: The elimination may keep a column if its remainder is at least this fraction of the longest remainder.
 _AS_GOOD = 0.5
-#: The message about a fixed parameter names at most `_NAMED` fitted parameters with the same effect. A fitted
-#: parameter is named only if its effect is more than the fraction `_SHARE` of the fixed parameter's effect.
+#: If a parameter is fixed, a message names fitted parameters that together have the same effect. The message
+#: names at most `_NAMED` fitted parameters. It names a fitted parameter only if its effect is more than the
+#: fraction `_SHARE` of the fixed parameter's effect.
 _NAMED, _SHARE = 3, 1e-6
 
 
@@ -96,12 +98,12 @@ class Identification:
 def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray | None = None) -> FloatArray:
     """Return the Jacobian (rows, p) of all measured coordinates, in metres.
 
-    The rows of angles are multiplied by the length `way.size`, so that they are in metres too.
+    The rows for rotations are multiplied by the length `way.size`, and are then in metres too.
 
     Args:
         model: The model.
         values: (s, n) joint values.
-        complete: Whether full poses are measured, not positions alone.
+        complete: True if full poses are measured, False if only positions are measured.
         at: (p,) parameters at which the Jacobian is computed. None: the model's start values.
     """
     L = model.way.size
@@ -120,7 +122,7 @@ def identify(
     Args:
         model: The model.
         values: (s, n) joint values.
-        complete: Whether full poses are measured, not positions alone.
+        complete: True if full poses are measured, False if only positions are measured.
         at: (p,) parameters at which the Jacobian is computed. None: the model's start values.
     """
     J = stacked(model, values, complete=complete, at=at)
@@ -170,7 +172,7 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
 
 #: If the sum of all redundancies is below this number, the fit cannot be checked.
 _ONE_OR_MORE = 0.5
-#: Smallest eigenvalue of the matrix 1 - H_ii that is not replaced by zero, relative to its largest
+#: An eigenvalue of the matrix 1 - H_ii is replaced by zero if it is below this fraction of the largest
 #: eigenvalue. If a pose has an error along an eigenvector with a smaller eigenvalue, the residuals do not
 #: show this error.
 _FOLLOWED = 1e-9
@@ -238,7 +240,7 @@ class Fit:
         noise: The standard deviations by which the residuals are divided.
         covariance: (k, k) covariance of the fitted parameters, in the units of the parameters. The covariance
             is infinite if the redundancy is 0.
-        left: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
+        left: (s, 6) or (s, 3) array with the redundancy of each measured coordinate, which is 1 - H_ii.
         odd: (s,) chi^2 statistic of each pose.
     """
 
@@ -284,8 +286,8 @@ class Fit:
 def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
     """Return the residuals, measured minus computed: (s, 6) for poses or (s, 3) for positions.
 
-    Each row contains the position error (m) and, for full poses, the rotation error (rad). The axes of the
-    errors are those of the base.
+    Each row contains the position error (m) and, for full poses, the rotation error (rad). The components of
+    the errors are along the axes of the base frame.
     """
     return _apart(measured, model.way.poses(measured.values, at))
 
@@ -419,7 +421,7 @@ def odd_poses(
 
 
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
-    """Select the parameters that moved by more than `SIGMAS` standard deviations, by backward elimination.
+    """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
 
     Each step resets the least significant parameter to its old value. It also adjusts the other parameters by
     their covariance with the reset parameter. The elimination ends when all remaining parameters are
@@ -440,7 +442,7 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
         # Rounding may make a small variance 0 or negative, because C contains differences of larger numbers.
-        # Such a parameter is known very precisely, and its change counts as significant.
+        # A parameter with such a small variance is known very precisely, so its change is significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:

@@ -2,14 +2,15 @@
 
 Compute the Jacobian with respect to the parameters.
 
-A model is a path (`urdfkin.model.path`). A path is a product of constant poses and elementary motions. The
-origins of a URDF and the rows of a Denavit-Hartenberg table are such products. The angle or length of an
-elementary motion is a parameter or a joint's value. The gain g of a joint scales its value by (1 + g), so the
-column of g in the Jacobian is the joint's column times the joint's value.
+A model is a path (`urdfkin.model.path`). A path is a product of constant poses and elementary motions. Each
+joint origin of a URDF is a product of this kind, and so is each row of a Denavit-Hartenberg table. The angle
+or length of an elementary motion is a parameter or a joint's value. A joint can have a gain g, which
+multiplies the joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the
+joint's value, multiplied by the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
-to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, z
-always shifts the origin along the joint's axis, even if the file contains another axis than z. A change of rz
+to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the
+parameter z always shifts the origin along the joint's axis, whatever axis the URDF gives. A change of rz
 changes the zero position of a revolute joint. The other four parameters move the axis. The gain is a seventh
 parameter, which a URDF cannot store. `base` and `tool` have six parameters each. The path begins with the
 motions of `base`, which give the pose of the robot's base in the instrument's frame. The path ends with the
@@ -62,13 +63,14 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Drive(Motion):
-    """An elementary motion, with the parameter or the joint that determines its amount.
+    """A motion whose angle or length is a parameter or a joint's value.
 
     Attributes:
-        parameter: Index of the parameter or of the joint's gain; None if the motion has neither.
-        joint: Index of the joint; None for a parameter.
-        sense: -1 if the path leads from the joint's child to its parent, or if the table's row has the
-            opposite sense.
+        parameter: Index of the parameter that gives the angle or length. For the motion of a joint: index of
+            the joint's gain, or None without a gain.
+        joint: Index of the joint whose value gives the angle or length. None if a parameter gives it.
+        sense: -1 if the path leads from the joint's child to its parent, or if the table's row subtracts the
+            joint's value.
     """
 
     parameter: int | None
@@ -113,7 +115,7 @@ class ParametricChain:
         return self.path.poses(self._amounts(values, self.start if at is None else at)[0])
 
     def frames(self, values: FloatArray, at: FloatArray) -> FloatArray:
-        """Return the poses (s, steps, 4, 4) after each step of the path; the last one is the tip's pose."""
+        """Return the poses (s, steps, 4, 4) after each transform of the path; the last pose is the tip's."""
         return self.path.frames(self._amounts(values, at)[0])
 
     def columns(
@@ -132,7 +134,7 @@ class ParametricChain:
         return T, columns
 
     def _amounts(self, values: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the amounts (s, motions) of all motions, and the derivative of each by its parameter."""
+        """Return the angle or length (s, motions) of each motion, and its derivative by the parameter."""
         factors = np.empty((len(values), len(self._drives)))
         numbers = np.ones(len(self._drives))
         for k, drive in enumerate(self._drives):
@@ -144,25 +146,27 @@ class ParametricChain:
     def rounding(self, values: FloatArray) -> float:
         """Bound the rounding error (metres) of each number that `columns` returns.
 
-        The bound of a number in radians is the result divided by `size`.
+        For numbers in radians, the bound is the result divided by `size`.
         """
         slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
         slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
         return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
 
 
-#: Largest angle (rad) between two axes of a table that count as parallel. Parallel axes of a real arm deviate
-#: by some milliradians. The common normal of such axes is far from the arm. Its distance is about a link's
-#: length divided by the angle.
+#: Two axes of a table are treated as parallel if the angle (rad) between them is at most this number.
+#: Parallel axes of a real arm deviate by some milliradians. The common normal of such axes is far from the
+#: arm. Its distance is about a link's length divided by the angle.
 PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: The parameters of an origin, in the order of multiplication: name, True for a rotation, index of the axis.
+#: The six parameters of an origin, in the order of multiplication. Each entry contains the name, whether the
+#: motion is a rotation, and the index of the coordinate axis.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order of preference among parameters with the same effect. The key is False for a prismatic joint.
-#: The joint's zero comes first, then motions of the joint's axis, then motions of the joint's frame alone.
+#: Order of preference among parameters with the same effect. The key is True for revolute joints, and False
+#: for prismatic joints. The joint's zero comes first, then motions of the joint's axis, then motions of the
+#: joint's frame alone.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
@@ -212,7 +216,7 @@ class Model:
         return found
 
     def table(self, at: FloatArray) -> DHTable | None:
-        """Return the table with its parameters set to `at`, or None if the model is a URDF's."""
+        """Return the table with the parameters `at`; None if the model describes a URDF."""
         if not isinstance(self.source, DHTable):
             return None
         cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.way.parameters) if not p.end}
@@ -227,7 +231,7 @@ class Model:
         return replace(self.source, rows=tuple(rows), base=T_base, tool=T_tool, snap=None)
 
     def _push(self, where: str, at: FloatArray, *, end: bool = False) -> FloatArray:
-        """Return the combined motion (4, 4) of a joint's, base's or tool's six parameters."""
+        """Return the (4, 4) transform by the six parameters of a joint, of the base or of the tool."""
         parameters = enumerate(self.way.parameters)
         values = {p.what: float(at[k]) for k, p in parameters if (p.where, p.end) == (where, end)}
         push = np.eye(4)
@@ -238,7 +242,7 @@ class Model:
 
 
 class _Maker:
-    """Builder of a model: collects steps and parameters from base to tip."""
+    """Builder of a model: it collects the transforms and the parameters, from base to tip."""
 
     def __init__(self, fit: Collection[str]) -> None:
         for name in fit:
@@ -283,7 +287,7 @@ class _Maker:
     ) -> Model:
         """Return the model; `kept` lists the parameters of each joint in order of preference."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
-        # Base and tool are first, because they are unknown, while the values of the joints are nearly known.
+        # Base and tool come first because they are unknown. The parameters of the joints are nearly known.
         places = dict.fromkeys((p.where, p.end) for p in self.parameters)
         groups = tuple(
             tuple(at[*place, what] for what in kept.get(place[0], _KEPT[True]) if (*place, what) in at)

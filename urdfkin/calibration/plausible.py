@@ -31,8 +31,8 @@ from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
 #: Limits of the rms position error, as fractions of the reach. A fit with an error above `_MISSED` is
-#: refused. `_CLOSE_BY` applies together with `_UNEXPLAINED`, and `_NO_BETTER` together with `_HARDLY_BELOW`.
-#: If the error is above `_SUSPECT`, urdfkin corrects each common mistake in the data and fits again.
+#: refused. The comments of `_UNEXPLAINED` and `_HARDLY_BELOW` explain `_CLOSE_BY` and `_NO_BETTER`. If the
+#: error is above `_SUSPECT`, urdfkin corrects each common mistake in the data and fits again.
 _MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
 #: Largest error of a fit, as a fraction of the spread of measured positions.
 #: A fit with a larger error is refused if the error also exceeds `_CLOSE_BY` times the reach.
@@ -45,16 +45,16 @@ _HARDLY_BELOW = 0.7
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
 #: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
-#: Two configurations count as one if their joint values (rad, m) differ by less than this number.
+#: Two configurations are treated as one if their joint values (rad, m) differ by less than this number.
 _ONE_CONFIGURATION = 1e-6
-#: Number of standard deviations that are subtracted from a change before it is judged.
+#: urdfkin subtracts this number of standard deviations from a change, and compares the rest with the limit.
 #: The reason is that the tilt of an axis near the target is poorly observable.
 _UNCERTAIN = 5.0
-#: Largest error after a correction, as a fraction of the error before the correction. `_BETTER` applies if
-#: the fit before the correction is accepted. `_NOT_WORSE` applies if that fit is refused.
+#: Largest error after a correction, as a fraction of the error before the correction. The limit is `_BETTER`
+#: if the fit before the correction is accepted, and `_NOT_WORSE` if that fit is refused.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted, beginning with the most promising corrections.
-#: The corrections also shift q by these numbers of rows, relative to the poses.
+#: Number of corrections that are fitted, beginning with the most promising corrections. Other corrections
+#: assign each row of q to the pose that is one or two rows earlier or later (`_SHIFTS`).
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
 #: Largest number of joints that a message names.
 _NAMED = 4
@@ -84,7 +84,7 @@ class Ended:
         q: (s, c) coordinates of the path.
         measured: The poses that were measured at `q`.
         identification: The identifiable and the fixed parameters.
-        before: The fit of base and tool alone.
+        before: The fit of only base and tool; all other parameters are fixed.
         fitted: The fit of all identifiable parameters.
     """
 
@@ -204,8 +204,8 @@ def _turned_zeros(model: Model, ended: Ended) -> list[str]:
 def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
     """Yield each fitted parameter of a moving joint, its change, and a lower bound of the change's size.
 
-    The lower bound is the size minus `_UNCERTAIN` standard deviations. If only positions were measured,
-    joints with an axis near the tip of the original model are skipped.
+    The lower bound is the absolute value of the change, minus `_UNCERTAIN` standard deviations of the change.
+    If only positions were measured, joints with an axis near the tip of the original model are skipped.
     """
     kept, fitted = ended.identification.kept, ended.fitted
     near = set[str]()

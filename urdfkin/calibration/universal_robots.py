@@ -7,9 +7,9 @@ disappear. The program writes the pose of each joint relative to the previous on
 
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies these angles into a URDF, where they mean Rz(yaw)
-Ry(pitch) Rx(roll). If one angle is a quarter turn and another angle is small, the two rotations differ by the
-small angle, which is 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's controller. The order
-"urdf" agrees with the URDF that the ROS description makes from the same file.
+Ry(pitch) Rx(roll). The two products differ if one angle is a quarter turn and another angle is small. The
+difference is the small angle, which is 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's
+controller. The order "urdf" agrees with the URDF that the ROS description makes from the same file.
 """
 
 from __future__ import annotations

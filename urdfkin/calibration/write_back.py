@@ -67,7 +67,7 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
     if joint.origin_element is not None:
         return list(with_attributes(data, joint.origin_element, values))
     written = " ".join(f'{name}="{value}"' for name, value in values.items())
-    # A joint without errors has at least the child elements parent and child.
+    # A valid <joint> element contains at least the elements <parent> and <child>.
     return [before(data, joint.element.children[0], f"<origin {written}/>")]
 
 

@@ -7,30 +7,32 @@ frame in this joint's frame. `step_between` writes A as a product:
 
 The factors Rz(phi) and Tz(delta) commute with the motion of the first joint, so they belong to the first
 joint's row. The factors Rz(phi_next) and Tz(delta_next) commute with the motion of the second joint, so they
-belong to the second joint's row. For skew axes and beta = 0, the seven numbers are unique up to a half turn
-of the x axis (Denavit and Hartenberg). Then a is the distance between the two joint axes. The offset delta is
-measured along the first axis, from the origin of the first joint frame to the common normal. The offset
-delta_next is measured along the second axis, from the common normal to the origin of the second joint frame.
-Parallel axes have many common normals. The common normal of nearly parallel axes can be very far from the
-robot. docs/dh.md explains how urdfkin chooses the numbers in these two cases.
+belong to the second joint's row. For two skew axes, beta is 0. The other six numbers are then unique, except
+that the direction of x can be reversed (Denavit and Hartenberg). The number a is the distance between the two
+joint axes. The offset delta is measured along the first axis, from the origin of the first joint frame to the
+common normal. The offset delta_next is measured along the second axis, from the common normal to the origin
+of the second joint frame. Parallel axes have many common normals. The common normal of nearly parallel axes
+can be very far from the robot. docs/dh.md explains how urdfkin chooses the numbers in these two cases.
 
-`steps_like` chooses all numbers that are not unique as in another table. Such numbers are the offsets along
-parallel axes and the directions of the x axes. If several axes are parallel, the pose of the tip determines
-only the sum of their offsets d. If several axes coincide, the pose of the tip determines only the sum of
-their angles theta. For such axes, urdfkin copies d or theta from the other table, except in one row. In this
-row, d or theta makes the sum correct. If it is the first row, a change of the base can have the same effect.
+The author of a table can choose the offsets along parallel axes and the directions of the x axes.
+`steps_like` makes the same choices as another table. If several axes are parallel, the pose of the tip
+determines only the sum of their offsets d. If several axes coincide, the pose of the tip determines only the
+sum of their angles theta. For such axes, urdfkin copies d or theta from the other table, except in one row.
+In that row, urdfkin computes d or theta so that the sum is correct. If that row is the first row, urdfkin can
+change the base instead.
 
-Two parallel axes do not determine the offset d of their row. A Hayati row does not determine its d either. In
-both cases, the next row contains the rest of the offset. The x axis of a Hayati row lies in a plane normal to
-the joint's axis, and d shifts this plane. Therefore, urdfkin computes the d of a row before the later rows.
+Two parallel axes do not determine the offset d of their row. The two axes of a Hayati row do not determine d
+of this row. In both cases, d can be chosen, and the offset of the next row compensates the choice. The x axis
+of a Hayati row lies in a plane normal to the joint's axis, and d shifts this plane. Therefore, urdfkin
+computes the d of a row before the later rows.
 
 **Noise.** Two correct programs read the same URDF and compute slightly different constant poses between two
 joint axes. The program that wrote the file may also have rounded each angle to fifteen digits.
 `urdfkin.kinematics.roundings` takes both effects into account. Angles that are written with fourteen or
 fifteen digits are therefore treated as round. For example, 1.5707963267949 and 3.14159265358979 differ by 15
 eps from a multiple of a right angle, where eps is the machine epsilon. An angle that is written with twelve
-digits differs by 900 eps or more and is not treated as round. The option `snap` replaces such an angle by the
-nearest multiple of 15 degrees and reports the effect.
+digits differs from the multiple by 900 eps or more, and is not treated as round. The option `snap` replaces
+such an angle by the nearest multiple of 15 degrees and reports the effect.
 
 If the tilt between two axes is below the noise, urdfkin treats the two axes as parallel. The table then
 contains zero instead of the tilt. Otherwise, the common normal could be very far from the robot. `left_out`
@@ -52,12 +54,13 @@ from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUM
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Two axes with a smaller tilt (rad) are nearly parallel. If a number in the URDF has an error, the position
-#: of their common normal has more than 100 times this error.
+#: Two axes with a smaller tilt (rad) are nearly parallel. If a number in the URDF has an error, the error of
+#: their common normal's position is more than 100 times as large.
 NEARLY_PARALLEL = 1e-2
 
 #: Two axes with a larger tilt (rad) are never treated as nearly parallel. If the tilt is between
-#: `NEARLY_PARALLEL` and this number, the distance of the common normal decides.
+#: `NEARLY_PARALLEL` and this number, the axes are treated as nearly parallel only if their common normal is
+#: far away.
 FAR_FEET = 0.35
 
 
@@ -88,7 +91,7 @@ class Step:
     free: bool = False
 
     def turned(self) -> Step:
-        """Return the step between the same axes with the direction of x reversed."""
+        """Return the numbers for the same two axes and the opposite direction of x."""
         alpha = math.pi if self.alpha == math.pi else -self.alpha
         return Step(
             self.phi + math.pi,
@@ -116,7 +119,7 @@ def step_between(
     delta_each: bool = False,
     noise: Noise | None = None,
 ) -> Step:
-    """Factor a constant pose into the seven numbers of a step.
+    """Factor the constant pose between two joint axes into the seven numbers of a `Step`.
 
     Args:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
@@ -125,8 +128,8 @@ def step_between(
         near_parallel: Kind of row for nearly parallel axes.
         phi_free: Value of phi for coinciding axes, for which every phi is correct.
         delta_each: For parallel axes: True if `delta` contains the offset, False if `delta_next` contains it.
-        noise: Tilts and lengths below this noise become zero. None: the noise of a pose that a single URDF
-            joint defines.
+        noise: Limits for tilts and lengths; smaller values are set to zero. None: the limits for the origin
+            of a single URDF joint.
 
     Returns:
         The step.
@@ -147,7 +150,7 @@ def _is_near(feet: Step, sine: float, reach: float) -> bool:
 
 
 def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
-    """Return the seven numbers for two skew axes.
+    """Return the numbers of the transform between two skew axes.
 
     The x axis points along the cross product of z and z_next. The length a is positive, or 0 if the axes
     intersect.
@@ -163,7 +166,7 @@ def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
 
 
 def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_each: bool) -> Step:
-    """Return the step between two parallel axes.
+    """Return the numbers of the transform between two parallel axes.
 
     The x axis is along the perpendicular through the origin of this joint's frame. If the axes coincide, they
     do not determine phi, and the function sets phi to `phi_free`.
@@ -178,7 +181,7 @@ def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_
 
 
 def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
-    """Return the step of a Hayati row (Hayati, 1983).
+    """Return the numbers of the transform between two axes for a Hayati row (Hayati, 1983).
 
     Consider the plane through the origin of this joint's frame, normal to this joint's axis. The x axis
     points from the origin to the intersection of this plane with the next axis.
@@ -208,15 +211,15 @@ def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) ->
 def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
     """Return a length without rounding noise.
 
-    If the length is 0 within rounding error, the function returns 0. If the length is a decimal number of
-    twelve digits within rounding error, the function returns this decimal number. Otherwise, it returns the
-    length unchanged.
+    If the length is 0 within rounding error, the function returns 0. If the length differs from a decimal
+    number of twelve digits only by rounding error, the function returns the decimal number. Otherwise, it
+    returns the length unchanged.
 
     Args:
         length: Metres.
-        reach: Size (metres) of the numbers from which the length is computed.
-        noise: Metres; a length below `noise` becomes zero. `noise` has an effect only if it exceeds the
-            rounding error of `reach`.
+        reach: Magnitude (metres) of the numbers from which the length was computed.
+        noise: Metres; a length below `noise` becomes zero. If the rounding error of `reach` is larger than
+            `noise`, the rounding error is the limit.
 
     Example:
         >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
@@ -265,15 +268,15 @@ class PairLike:
     def passes_on(self) -> bool:
         """Whether the two axes do not determine the row's offset d.
 
-        The next row then contains the rest of the offset.
+        In this case, d can be chosen, and the offset of the next row compensates the choice.
         """
         return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
 
     @property
     def _gets_hayati_row(self) -> bool:
-        """Whether the pair of axes gets a Hayati row.
+        """Whether the table has a Hayati row for these two axes.
 
-        If a row of four parameters is possible too, the other table decides between the two kinds of rows.
+        If a row of four parameters is possible too, urdfkin uses the kind of row that the other table has.
         """
         sine = tilt_of(self.A)
         leans_there = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
@@ -292,11 +295,11 @@ class PairLike:
 
         This x axis lies in a plane normal to the first axis.
 
-        The next axis intersects the plane in a point. The distance of this point from the first axis is the
-        cell a in the other table. The component of this distance in the direction of the tilt determines the
-        position of the plane. The position error is then the rounding error divided by the tilt. For a slight
-        tilt, the component normal to the direction of the tilt gives a more accurate position. The result is
-        None if the plane is farther away than `reach`.
+        The next axis intersects the plane in a point. In the other table, the cell a is the distance of this
+        point from the first axis. The component of a in the direction of the tilt determines the position of
+        the plane. The position error is then the rounding error divided by the tilt. For a slight tilt,
+        urdfkin computes this component from a and from the component normal to the tilt. This formula is then
+        more accurate. The result is None if the plane is farther away than `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)
@@ -311,7 +314,7 @@ class PairLike:
         return cut if abs(cut) <= self.reach else None
 
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> Step:
-        """Return the step between the two axes.
+        """Return the numbers of the transform between the two axes.
 
         `carry` is the offset (metres) along the first axis from the DH frame to the joint's frame. `d` is the
         row's offset, which is used only if the two axes do not determine it.
@@ -328,9 +331,9 @@ class PairLike:
         return replace(step, delta=step.delta + d) if d else step
 
     def passed_back(self, carry: float) -> float:
-        """Return the offset (metres) from the DH frame to this joint's frame, if d = 0.
+        """Return the offset (metres) from this joint's DH frame to this joint's frame, for a row with d = 0.
 
-        `carry` is the corresponding offset of the next joint.
+        `carry` is the offset from the next joint's DH frame to the next joint's frame.
         """
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
@@ -340,17 +343,17 @@ def steps_like(
 ) -> tuple[list[Step], list[float]]:
     """Compute the transforms between consecutive axes of a path.
 
-    Numbers that are not unique are the same as in another table.
+    If a number can be chosen freely, the function copies the number from another table.
 
     Args:
         pairs: All pairs of consecutive axes.
         phi_in: Angle about the first axis from frame 0 to the first joint's frame (rad).
         carry: Offset along the first axis from frame 0 to the first joint's frame (metres).
-        tip: Offset (metres) before the last row. With it, the last d is the same as in the other table.
-            None if the tool or the last row gets the remaining offset.
+        tip: Offset (metres) before the last row. With this offset, d of the last row equals d in the other
+            table. None: these two numbers may differ, and the last row or the tool contains the difference.
 
     Returns:
-        The steps between consecutive axes, and theta of each row.
+        The numbers of the transforms between consecutive axes, and theta of each row.
     """
     steps, inputs = list[Step](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -371,7 +374,7 @@ def steps_like(
 def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
     """Return d of a row whose two axes do not determine d.
 
-    The result makes d equal in the two tables, either in this row or in a later row.
+    The function chooses d so that d of this row, or of a later row, equals d in the other table.
     """
     pair = pairs[i]
     if not pair.passes_on or not (pair.slides or (i == 0 and pair.row.d)):
@@ -383,8 +386,8 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
     if end < len(pairs):
         target = None if pairs[end].slides else pairs[end].row.d - pairs[end].foot
     if target is None:
-        # A later prismatic joint or the tool gets the remaining offset.
-        # A Hayati row before this joint or tool may determine d.
+        # The remaining offset becomes part of d of a later prismatic joint, or of the tool. If there is a
+        # Hayati row in between, the plane of its x axis may determine d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         cut = pairs[end].cut
         if cut is None:
@@ -400,7 +403,8 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
 def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: float) -> float:
     """Return phi for two coinciding axes, for which any value of phi is correct.
 
-    The result makes theta equal in the two tables, either in this row or in the prismatic rows after it.
+    The function chooses phi so that theta of this row, or of the prismatic rows after it, equals theta in the
+    other table.
     """
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].slides:
@@ -418,7 +422,7 @@ def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int,
 
 
 def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
-    """Return the step; reverse the direction of x if the reversed step is closer to the other table.
+    """Return the `Step` with the direction of x for which the cells are closer to the other table.
 
     The function compares the cells a, alpha and beta with the same cells of the other table. If the two
     directions of x are equally close, the function compares theta.
@@ -434,7 +438,7 @@ def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
 
 
 def near(theta: float, there: float) -> float:
-    """Return `theta` in (-pi, pi]. An angle within rounding error of `there` becomes `there`."""
+    """Return `theta` in (-pi, pi]. If `theta` and `there` differ only by rounding error, return `there`."""
     off = math.remainder(theta - there, 2.0 * math.pi)
     return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
 
@@ -481,17 +485,17 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Largest angle (radians) and length (metres) that count as rounding errors in a constant pose."""
+    """Largest angle (radians) and length (metres) that are treated as rounding errors in a constant pose."""
 
     radians: float
     metres: float
 
 
 def noise_of(joints: int, length: float, reach: float) -> Noise:
-    """Return the largest angle and the largest length that count as rounding errors in a constant pose.
+    """Return the largest angle and length that are treated as rounding errors in a constant pose.
 
     Args:
-        joints: Number of URDF joints that the constant pose combines.
+        joints: Number of URDF joints whose origins are multiplied to give the constant pose.
         length: Sum of the offsets of these joints (metres).
         reach: Length of the whole path (metres).
 
@@ -514,7 +518,7 @@ def noises(chain: FrameChain, reach: float) -> list[Noise]:
 def left_out(chain: FrameChain) -> float:
     """Return the sum (rad) of those tilts between consecutive axes that are not larger than rounding errors.
 
-    The sum contains the tilts of z axes and of x axes.
+    Tilts of z axes and tilts of x axes are both added.
     """
     found = 0.0
     for A, noise in zip(chain.constants, noises(chain, 0.0), strict=True):

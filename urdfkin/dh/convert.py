@@ -6,9 +6,10 @@ The standard and the modified convention group the same factors S and X of `urdf
     modified   base' . (X_0 S_1) (X_1 S_2) ... (X_{n-1} S_n) . tool'
 
 The conversion to the modified convention moves X_n into the tool. The conversion to the standard convention
-moves X_0 into the base. In the first modified row, the cells a and alpha are free. If the base has the form
-Tx(a) Rx(alpha), it moves into these two cells. In the same way, a tool of this form moves into the last
-standard row. Therefore, conversion to the other convention and back gives the original table.
+moves X_0 into the base. No standard row contains the cells a and alpha of the first modified row. If the base
+is a product Tx(a) Rx(alpha), the conversion writes a and alpha into these two cells, and the base becomes the
+identity. In the conversion to the standard convention, a tool of the form Tx(a) Rx(alpha) is written into the
+last row. Therefore, conversion to the other convention and back gives the original table.
 
 In a tree, each joint's frame is a Denavit-Hartenberg frame. In a standard table z_{i-1} is the axis of joint
 i, so the frame of joint i is frame i - 1. The pose of frame i in frame i - 1 is S_i X_i. If the joint is at
@@ -73,10 +74,10 @@ UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 def to_tree(table: DHTable) -> KinematicTree:
     """Return the table's robot as a tree from the base frame to the tip.
 
-    The tree has the joint names, senses, limits and mimic rules of the rows. If a mimicked joint is not on
-    the path, it becomes a separate joint on the base, so that the tree has the same coordinates as the table.
-    A revolute joint without limits becomes continuous. A prismatic joint without limits gets -1 km to 1 km,
-    because URDF requires limits.
+    The tree contains the joint names, joint directions, limits and mimic rules from the rows. If a mimicked
+    joint is not on the path, it becomes a separate joint on the base, so that the tree has the same
+    coordinates as the table. A revolute joint without limits becomes continuous. A prismatic joint without
+    limits gets -1 km to 1 km, because URDF requires limits.
 
     Args:
         table: Any table.

@@ -48,14 +48,14 @@ RIGHT_ANGLE_SLACK = 1e-3
 
 
 class Last(StrEnum):
-    """End of the last row: the tip (if four parameters suffice) or the flange, where the tool begins."""
+    """Whether the last row ends at the tip (if four parameters suffice) or at the flange."""
 
     TIP = "tip"
     FLANGE = "flange"
 
 
 class First(StrEnum):
-    """Whether the cells d_1 and theta_1 or the pose `base` contain the transform to the first joint."""
+    """Where the transform from the base to the first joint is: in the cells d_1 and theta_1, or in `base`."""
 
     BASE = "base"
     JOINT = "joint"
@@ -64,7 +64,8 @@ class First(StrEnum):
 class Sign(StrEnum):
     """Cell that determines the direction of x.
 
-    With THETA, |theta| is at most a right angle. With A or ALPHA, this cell is not negative.
+    With THETA, |theta| is at most a right angle. With A, the cell a is not negative. With ALPHA, the cell
+    alpha is not negative.
     """
 
     THETA = "theta"
@@ -80,7 +81,7 @@ class Slide(StrEnum):
 
 
 class ParallelOffset(StrEnum):
-    """Row that contains the offset along consecutive parallel axes."""
+    """For consecutive parallel axes: the row that contains the offset along these axes."""
 
     LAST = "last"
     FIRST = "first"
@@ -144,14 +145,14 @@ def choices_of(
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
     """Return the table of a chain.
 
-    The product base . rows . tool equals the chain's placement for every q, except for rounding.
+    The product base . rows . tool equals the pose of the chain's tip for every q, except for rounding.
 
     Args:
         chain: The path.
         choices: The options.
         like: A standard table of the same joints. The result has the same directions of x and the same
             offsets along parallel axes. The zero positions of the first and the last joint are also the same.
-            These have priority over `choices`.
+            If `like` and `choices` contradict each other, `like` is used.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -241,12 +242,13 @@ def _use_freedom_of_prismatic_axes(
 ) -> None:
     """Choose the axis lines of prismatic joints; a prismatic joint defines only the direction of its axis.
 
-    A prismatic motion commutes with every translation, so a shift of the joint's line changes no placement.
-    The first joint's line passes through the base's origin, so that the base can be the identity. The last
-    joint's line passes through the tip if the table then needs no tool. In a table without Hayati rows,
-    urdfkin checks whether a prismatic axis is nearly parallel to the axis of a neighbouring joint. If it is,
-    the prismatic joint's line passes through the origin of the neighbouring joint. Otherwise, the common
-    normal would be far from the robot.
+    A prismatic motion commutes with every translation. Therefore, the axis line of a prismatic joint can be
+    shifted without a change of the tip's poses. If the first joint is prismatic, its axis line passes through
+    the base's origin, so that the base can be the identity. If the last joint is prismatic, its axis line
+    passes through the tip, unless the table needs a tool anyway. In a table without Hayati rows, urdfkin
+    checks whether a prismatic axis is nearly parallel to the axis of a neighbouring joint. If the prismatic
+    axis is nearly parallel, its line is shifted to the origin of the neighbouring joint. Otherwise, the
+    common normal would be far from the robot.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
@@ -316,7 +318,7 @@ def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> No
 
 
 def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, float, float]:
-    """Return T_base_0, and the angle about z_0 and the offset along z_0 to the frame of the first joint."""
+    """Return T_base_0; also the angle about z_0, and the offset along z_0, from frame 0 to joint 1."""
     z, p = A[:3, 2], A[:3, 3]
     offset = cleaned_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
@@ -364,7 +366,7 @@ def _steps(
 
 
 def _offset_for_last_row(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
-    """Return the offset (metres) before the last row that makes d of the last row equal in the two tables.
+    """Return the offset (metres) before the last row with which d of this row is equal in the two tables.
 
     The result is None if d cannot be equal, for example because the other table has a tool.
     """
@@ -398,8 +400,9 @@ def _last_like(
 ) -> tuple[float, float, Step, FloatArray]:
     """Return the numbers of the last row, and the tool.
 
-    If theta differs, or if one of the two tables has a tool, the function copies theta, a and alpha of the
-    other table. The tool then contains the difference. Otherwise, the numbers are unchanged.
+    If theta of the last row is equal in the two tables, and neither table has a tool, the numbers are
+    unchanged. Otherwise, the function copies theta, a and alpha from the other table, and the tool contains
+    the difference.
     """
     row = like.rows[-1]
     as_there = _has_no_tool(like) and np.array_equal(tool, np.eye(4))
@@ -416,10 +419,10 @@ def _last_like(
 
 
 def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
-    """Whether x must be reversed by the rule `sign`.
+    """Whether the rule `sign` requires the opposite direction of x.
 
-    The rule "a" makes a not negative. If a is 0, it makes alpha not negative. The rule "alpha" makes alpha
-    not negative. If alpha is 0 or pi, it makes the length a not negative.
+    With the rule "a", the cell a must be 0 or positive; if a is 0, then alpha must be 0 or positive. With the
+    rule "alpha", the cell alpha must be 0 or positive; if alpha is 0 or pi, then a must be 0 or positive.
     """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign is Sign.THETA or (not step.a and not by_alpha):
@@ -428,7 +431,7 @@ def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
 
 
 def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
-    """Whether a row without a tool can express the pose A: Rz Tz Tx Rx (standard) or Rz Tz (modified)."""
+    """Whether A is a product Rz Tz Tx Rx (standard) or Rz Tz (modified), so that no tool is needed."""
     if choices.last is Last.FLANGE:
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
@@ -441,7 +444,7 @@ def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
 def _last(
     A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
 ) -> tuple[float, float, Step, FloatArray]:
-    """Return theta, d and the step of the last row, and the tool.
+    """Return theta and d of the last row, the `Step` with its other cells, and the tool.
 
     `A` is the tip's pose in the last joint's frame, shifted along z to the origin O_{n-1}.
     """
@@ -464,10 +467,10 @@ def _last(
 
 
 def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
-    """Move the offsets along consecutive parallel axes into the first row of these axes.
+    """Add the offsets along consecutive parallel axes, and write the sum into the first row of these axes.
 
-    An offset along z keeps its sign between axes of the same direction (alpha = 0). It changes its sign
-    between axes of opposite directions (alpha = pi).
+    If two axes have the same direction (alpha = 0), the offset along the second axis is added. If the axes
+    have opposite directions (alpha = pi), the offset along the second axis is subtracted.
     """
     moved = list(rows)
     for i in range(len(steps) - 1, -1, -1):

@@ -3,9 +3,10 @@
 You can request a table with the same frames as a published table. The author of a table chooses the positive
 direction of each joint and the direction of each x axis. `reversed_like` finds all likely combinations of
 positive directions. It derives a table for each combination, and selects the table that is closest to the
-published table. The difference of the cells decides first. Among tables with equally close cells, the zero
-positions of the joints decide, and then base and tool. In the table of a Kinova arm, for example, the first
-joint has the opposite direction of the joint in the URDF. Frame 0 is upright as in the data sheet.
+published table. The closest table is the table whose cells differ least. If several tables have equally close
+cells, urdfkin compares the zero positions of the joints, and then base and tool. In the published table of a
+Kinova arm, for example, the positive direction of the first joint is opposite to the URDF. The z axis of
+frame 0 then points up, as in the data sheet.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ from urdfkin.errors import InputError, Question
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: Limits of differences, relative to the reach, or in rad. A table whose cells differ by more than `_ANOTHER`
-#: describes another robot. Two zero positions of a joint are different if their angles differ by more than
-#: `_OTHER`.
+#: A table whose cells differ by more than `_ANOTHER` describes another robot. The number is in rad for
+#: angles, and relative to the reach for lengths. Two zero positions of a joint are different if their angles
+#: differ by more than `_OTHER`.
 _ANOTHER, _OTHER = 0.1, 1e-2
-#: Two cells with a smaller difference (relative to the reach, or in rad) count as equal.
+#: Two cells with a smaller difference (relative to the reach, or in rad) are treated as equal.
 _ROUNDING = 1e-12
 
 
@@ -40,7 +41,7 @@ def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTa
 
     Args:
         chain: The path.
-        choices: The options. Their `flip` contains the joints from `reversed_like`.
+        choices: The options. The attribute `flip` must contain the joints from `reversed_like`.
         reference: The other table.
     """
     standard = replace(choices, convention=Convention.STANDARD)
@@ -94,7 +95,7 @@ def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float
     n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
         apart = abs(row.a - other.a) / reach
-        if i < n - 1:  # base and tool contain the transforms outside the first and the last axis
+        if i < n - 1:  # base and tool contain the transforms before the first axis and after the last axis
             placed = row.kind.turns and found.rows[i + 1].kind.turns
             cells = max(cells, abs(_angle(row.alpha, other.alpha)), apart * placed)
             lines = max(lines, abs(row.beta - other.beta), apart)
@@ -146,9 +147,9 @@ def dh_table(
             angle as it is in the file.
         last: "tip": the last row reaches the tip if four parameters suffice. "flange": the tool contains the
             transform from the last axis to the tip.
-        parallel_offset: Row that contains the offset along consecutive parallel axes. "last": the row of the
-            last of these axes. "first": the row of the first of these axes. "each": every row contains the
-            offset of its own link.
+        parallel_offset: For consecutive parallel axes: the row that contains the offset along these axes.
+            "last": the last of these rows contains the sum of the offsets. "first": the first of these rows
+            contains the sum. "each": every row contains the offset of its own link.
         flip: Names of joints whose positive direction is reversed. The attribute `sense` of their rows is -1.
         first: "base": if possible, d_1 and theta_1 contain the transform from the base to the first axis.
             "joint": the base contains this transform, so that d_1 and theta_1 are zero (Craig's frame 0).

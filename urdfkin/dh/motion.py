@@ -2,8 +2,9 @@
 
 The module uses equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64). The forward
 recursion of `urdfkin.compiled` runs on a tree whose joint frames are the table's frames. In this tree every
-mimic joint has its own coordinate. The module applies the mimic rules separately: the joint values are G q +
-g, so the Jacobian is J = J_rows G, where J_rows is the tree's Jacobian with one column for each row.
+mimic joint has its own coordinate. The module applies the mimic rules separately. The joint values are G q +
+g. Let J_rows be the tree's Jacobian, with one column for each row. Then the Jacobian with mimic rules is J =
+J_rows G.
 """
 
 from __future__ import annotations
@@ -90,12 +91,12 @@ def acceleration(
 
 
 def _joint_derivatives(table: DHTable, rates: Given, what: str) -> FloatArray:
-    """Convert velocities or accelerations of the coordinates to those (..., rows) of all joints."""
+    """Convert velocities (or accelerations) of the coordinates to velocities (..., rows) of all joints."""
     return table.coupling.checked(rates, what) @ table.coupling.matrix.T
 
 
 def _flat(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Return the common batch shape, and the arrays broadcast to it with shape (n, rows)."""
+    """Broadcast the arrays; return their common batch shape, and the arrays with shape (n, rows)."""
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     rows = len(table.rows)
     wide = [np.broadcast_to(array, (*shape, rows)).reshape(math.prod(shape), rows) for array in arrays]

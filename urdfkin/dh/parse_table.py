@@ -108,7 +108,7 @@ def from_sheet(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column: its name ("" if unknown), its heading, its unit, and whether the heading contains i-1."""
+    """A column of a table in text; `previous` says whether the heading contains i-1."""
 
     name: str
     heading: str = ""
@@ -171,7 +171,7 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
 def _no_header(lines: list[str]) -> InputError:
     """Return the error for a text without the four required headings.
 
-    The error quotes the line with the most of these headings.
+    The error quotes the line that contains the most required headings.
     """
     said = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
     named = [[cell.strip() for cell in cells if cell.strip()] for cells in said]
@@ -337,9 +337,9 @@ def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _named_coordinates(lines: list[str]) -> list[str]:
-    """Return the joint names in a text such as `with q1 = left, q2 = right`.
+    """Return the joint names in a line such as `with q1 = left, q2 = right`.
 
-    urdfkin prints such a text if the coordinates differ from the rows' joints or have another order.
+    urdfkin prints this line if the coordinates differ from the joints of the rows, or have another order.
     """
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
     return [_unescaped(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
@@ -395,7 +395,7 @@ def _unescaped(name: str) -> str:
 
 
 def _nested(row: dict[str, Any]) -> dict[str, Any]:
-    """Replace the columns of a mimic rule by a mapping, and do the same for the columns of limits.
+    """Put the cells of a mimic rule into a mapping `mimic`, and the cells of limits into a mapping `limit`.
 
     If the row has no mimic rule, `offset` is added to theta or d.
     """

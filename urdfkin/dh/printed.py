@@ -3,7 +3,7 @@
 The rounding error of an angle rotates the rest of the chain. This rotation moves the tip by at most the error
 times the sum of all later lengths. The rounding error of a length shifts the rest of the chain. The sum of
 these effects is a bound of the tip error for every configuration within the limits. The module also computes
-the largest error on samples.
+the largest error in sampled configurations.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class PrintedPrecision:
 
     Attributes:
         digits: Number of printed significant digits.
-        metres: Largest distance on samples between the tip of the printed table and the tip of the exact
-            table (metres).
+        metres: Largest distance (metres), in sampled configurations, between the tip of the printed table and
+            the tip of the exact table.
         bound: Guaranteed bound (metres) of this distance at all joint values within the limits; None if there
             is no bound.
         samples: Number of samples.
@@ -62,8 +62,8 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     base, tool = (_pose(T, digits) for T in (table.base, table.tool))
     bounds = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
     q = values_within([bounds.get(name, UNKNOWN) for name in table.joint_names], SAMPLES)
-    # A DHTable accepts only exact rotations in base and tool.
-    # Therefore, the rounded base and tool are not in the table but are multiplied separately.
+    # A DHTable accepts only exact rotations in base and tool. Therefore, the table here has no base and tool,
+    # and the code multiplies by the rounded base and tool.
     between = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)

@@ -18,7 +18,8 @@ joint values in SI units. An effort is in N or N m.
 
 `last_digits` returns the precision of each number as it is written: half a unit of its last digit. For
 example, 311.1 mm in a data sheet is uncertain by 0.05 mm. A number without a decimal point (90 degrees, zero)
-and a multiple of pi are exact. A whole number of millimetres is an exception, and counts as a rounded length.
+and a multiple of pi are exact. However, a whole number of millimetres is not treated as exact: it is
+uncertain by 0.5 mm.
 """
 
 from __future__ import annotations
@@ -140,7 +141,8 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
 
     Angles of a table are nearly always multiples of 15 degrees. Lengths hardly ever look like such angles. In
     the Robotics Toolbox's order, the first and the fourth column contain angles, and the second column
-    contains lengths. Rows are rejected if the numbers in these three columns look like this.
+    contains lengths. Rows are rejected if the first and the fourth column look like angles, and the second
+    column looks like lengths.
 
     Raises:
         InputError: the columns seem to be in the other order; the message names the two orders.
@@ -216,7 +218,7 @@ def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where:
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
-    """Replace a cell such as "q3 + pi" with the constant pi, and add kind and sense of the joint."""
+    """Replace a cell such as "q3 + pi" with the constant pi; add the keys `kind` and `sense` to the row."""
     written = {name: fields[name] for name in ORDER if isinstance(fields.get(name), str)}
     cells = {name: _read(value, f"{where}, {name}") for name, value in written.items()}
     own = [name for name, cell in cells.items() if cell.times is not None]

@@ -185,7 +185,7 @@ class ProductOfExponentials(Displayable):
 
         The bound does not contain the effect of rounding in q.
 
-        It is twice the bound for a Denavit-Hartenberg table of the same path.
+        The bound is twice the bound for a Denavit-Hartenberg table of the same path.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")

@@ -7,8 +7,9 @@ snapped, from base to tip:
 2. the tilt between consecutive axes, and the rotations before and after it;
 3. the angle theta of each row, after the rows are computed.
 
-Positions stay as they are in the file, so each change only rotates the rest of the chain about a joint's
-origin. `urdfkin.dh.table` uses this to derive a bound of the effect on the tip.
+The positions of joint origins are not changed. Therefore, each change of an angle only rotates the rest of
+the chain about a joint's origin. From these rotations, `urdfkin.dh.table` derives a bound of the effect on
+the tip.
 
 `snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). For example, such
 an angle may cause a tilt of 5e-12 rad. This tilt is larger than rounding errors of the computation
@@ -95,7 +96,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
 def statement(
     exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float
 ) -> SnapReport:
-    """Return the sum of the bounds of all changes, and the largest effect of the changes on samples."""
+    """Return the sum of the bounds of all changes, and their largest effect in sampled configurations."""
     radians = sum((change.angle for change in changes), 0.0)
     per_metre = dict[str, float]()
     for change in changes:
@@ -244,7 +245,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is Convention.STANDARD else k
 
 
-#: Assumed range of the coordinate of a mimicked joint that is not on the path (rad or metres).
+#: If a mimicked joint is not on the path, its coordinate is assumed to be in this range (rad or metres).
 UNKNOWN = (-1.0, 1.0)
 
 
@@ -281,8 +282,8 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
     """Return a hint about cells that nearly equal a multiple of 15 degrees or zero.
 
-    The hint names one of these cells. It also recommends the tolerance in `TOLERANCES` with which the fewest
-    such cells remain.
+    The hint names one of these cells. It also recommends a tolerance from `TOLERANCES`: the tolerance after
+    which the fewest cells nearly equal a round value.
 
     Args:
         table: An exact table.
@@ -290,7 +291,8 @@ def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None
             multiples of 15 degrees.
 
     Returns:
-        One line of text. None if there is no such cell, or if no tolerance reduces the number of such cells.
+        One line of text. None if no cell nearly equals a round value, or if no tolerance reduces the number
+        of these cells.
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:

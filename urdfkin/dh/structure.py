@@ -16,7 +16,8 @@ with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF
 frames, the zero positions and the positive directions of the joints are the same as in the OPW table. The OPW
 parameters are read from the derived table. OPW has no parameter for the small tilts of a calibrated arm, so
 `opw_of` ignores these tilts. `Opw.placement` computes the solver's forward kinematics with the OPW
-parameters. The difference from the arm's placement is the error of the OPW parameters.
+parameters. The error of the OPW parameters is the difference between this pose and the pose that urdfkin
+computes for the arm.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
@@ -47,11 +48,11 @@ from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind
 
-#: Largest deviations (rad, metres) of a property that is reported, for example parallel axes.
-#: The property counts as exact if its deviations are at most `EXACT` (rad and metres).
+#: Largest deviations (rad, metres) of a property that is reported, for example parallel axes. The property is
+#: reported as exact if its deviations are at most `EXACT` (rad and metres).
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
-#: Singular values of the Jacobian below this limit count as zero.
-#: Rounding errors are far smaller, and the distances of real axes are far larger.
+#: Singular values of the Jacobian below this limit are treated as zero. Rounding errors are far smaller, and
+#: the distances of real axes are far larger.
 _RANK = 1e-6
 #: Number of random configurations within the limits for the estimate of the reach; mimic rules are ignored.
 _SAMPLES = 2000
@@ -105,10 +106,11 @@ class Structure:
         joints: R or P for each joint.
         freedoms: Degrees of freedom of the tip: the Jacobian's rank at a random configuration.
         pairs: Angle and distance of each pair of consecutive axes.
-        kinds: Properties that the path has exactly or approximately, in ascending order of the deviation.
+        kinds: Exact and approximate properties of the path; the property with the smallest deviation is
+            first.
         reach: Upper bound of the tip's distance (metres) from a point of the first axis. The point is the one
             nearest to the second axis.
-        reached: Largest distance of the tip from the same point on samples (metres).
+        reached: Largest distance of the tip from this point in sampled configurations (metres).
         solvers: Closed-form solutions, with libraries that implement them.
     """
 
@@ -299,7 +301,7 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the tip's positions at samples within the limits, and the Jacobian at the first sample."""
+    """Return the tip's positions in random configurations, and the Jacobian in the first of them."""
     ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
     values = values_within(ranges, _SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
@@ -324,7 +326,7 @@ class Opw:
         offsets: Constant `offset` of each joint (rad).
         signs: Factor `sign` of each joint, +1 or -1.
         base: (4, 4) pose of the solver's base in the URDF's base.
-        tool: (4, 4) pose of the URDF's tip in the solver's flange.
+        tool: (4, 4) pose of the URDF's tip in the solver's flange frame.
     """
 
     joints: tuple[str, ...]
@@ -426,8 +428,8 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 def _read(table: DHTable) -> Opw:
     """Return the OPW parameters of an arm.
 
-    The input is a table of the arm that has the frames of the OPW table. Cells without a corresponding OPW
-    parameter are ignored.
+    The frames of `table` must be the frames of the OPW table. The function ignores cells without a
+    corresponding OPW parameter.
     """
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
@@ -440,9 +442,9 @@ def _read(table: DHTable) -> Opw:
 
 
 def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axes H (n, 3), and the steps P (n + 1, 3) between points on these axes, in metres.
+    """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) between points on these axes, in metres.
 
-    The first step begins at the base, and the last step ends at the tip.
+    The first vector begins at the base, and the last vector ends at the tip.
 
     Args:
         screws: A path of revolute joints.

@@ -1,7 +1,7 @@
 """Define the Denavit-Hartenberg table: rows, base and tool, in the standard or the modified convention.
 
-Section 7.5 of the textbook describes these tables. A table represents a product of transforms. Two kinds of
-factors alternate in it:
+Section 7.5 of the textbook describes these tables. A table represents a product of transforms. The product
+alternates between two kinds of factors:
 
     S = Rz(theta) Tz(d)              about and along a joint's axis
     X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row
@@ -16,8 +16,9 @@ is the constant in the row plus `sense` times the joint's value. The standard co
 z_{i-1} is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
 Snapping replaces angles by multiples of 15 degrees. `SnapReport` states the effect of snapping on the tip: a
-guaranteed bound, and the largest effect on samples. A rotation by a small angle about a joint's origin moves
-the tip by at most that angle times the tip's distance from the origin. This distance is at most the path
+guaranteed bound, and the largest effect in sampled configurations. A rotation by a small angle about a
+joint's origin moves the tip by at most that angle times the tip's distance from the origin. This distance is
+at most the path
 length: the sum of the constant offsets from that origin to the tip, plus the travel of the prismatic joints.
 The sum of the bounds of all changes is valid for every configuration.
 """
@@ -132,8 +133,8 @@ class DHRow:
 
         In a Hayati row, the x axis intersects the next joint's axis at the distance `a`. The angle `beta`
         tilts the next joint's axis in the direction of x, and `alpha` tilts it normal to x. A row of four
-        parameters would use the common normal of the two axes. The distance is measured along the next
-        joint's axis, from its intersection with x to the common normal. It is |a sin(beta)| / sin^2(tilt).
+        parameters would use the common normal of the two axes. The distance begins where x intersects the
+        next joint's axis, and ends at the common normal. It is |a sin(beta)| / sin^2(tilt).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -166,8 +167,8 @@ class DHRow:
         return along_axis(self.theta, self.d)
 
 
-#: Largest difference between a handwritten angle and the multiple of 15 degrees that it looks like.
-#: The unit of the difference is 15 degrees.
+#: Largest difference between a handwritten angle and the multiple of 15 degrees that it looks like. The
+#: difference is divided by 15 degrees.
 _WRITTEN = 1e-3
 
 
@@ -197,7 +198,7 @@ def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
 
 
 def as_step(T: FloatArray) -> tuple[float, float] | None:
-    """Return (a, alpha) if a pose is Tx(a) Rx(alpha), except for rounding in the rotation; else None.
+    """Return (a, alpha) if a pose equals Tx(a) Rx(alpha), up to rounding of the rotation; else None.
 
     Example:
         >>> as_step(between_axes(0.5, math.pi))
@@ -241,14 +242,14 @@ class SnapChange:
     """One snapped angle, and the rotation of the chain that it causes.
 
     Attributes:
-        row: Index of the row that contains the angle, from 0; -1 for the base, the number of rows for the
-            tool.
+        row: Index of the row that contains the angle, from 0. An angle in the base has the index -1. For an
+            angle in the tool, the index is the number of rows.
         what: The joint and the snapped quantity, as text.
         angle: Angle (rad) by which the change rotates the rest of the chain.
-        lever: Largest distance of the tip from the pivot of the rotation, with the prismatic joints at zero
-            (metres).
-        sliders: Names of the prismatic joints after the pivot; the travel of these joints increases the
-            distance.
+        lever: Largest distance (metres) of the tip from the origin about which the chain rotates, with the
+            prismatic joints at zero.
+        sliders: Names of the prismatic joints between this origin and the tip. The travel of these joints
+            increases the distance.
     """
 
     row: int
@@ -273,9 +274,9 @@ class SnapReport:
         metres: Guaranteed bound of the tip's displacement within the limits of prismatic joints (metres).
         radians: Guaranteed bound of the tip's rotation (radians).
         per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
-        measured_metres: Largest displacement of the tip on samples (metres).
-        measured_radians: Largest rotation of the tip on samples (radians).
-        samples: Number of samples.
+        measured_metres: Largest displacement of the tip in sampled configurations (metres).
+        measured_radians: Largest rotation of the tip in sampled configurations (radians).
+        samples: Number of sampled configurations.
     """
 
     tolerance: float
@@ -478,7 +479,7 @@ class DHTable(Displayable):
     def rounding(self, q: Given) -> FloatArray:
         """Return a bound (...,) in metres for the position error that rounding causes in `placement(q)`.
 
-        The result divided by `span` is a bound of the orientation error in radians.
+        To get a bound of the orientation error in radians, divide the result by `span`.
 
         The position bound is the length of the chain times the sum of the rounding errors of the rows and of
         their angles (`urdfkin.kinematics.roundings`).
@@ -495,7 +496,7 @@ class DHTable(Displayable):
         return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
-        """Return bounds (...,), in m and rad, of the difference between the table's placement and the URDF's.
+        """Return bounds (...,), in m and rad, of the difference between the tip's poses of table and URDF.
 
         For an exact table these are the bounds of rounding errors. If angles of the table were snapped to
         multiples of 15 degrees, the bounds include the effect of these changes.
@@ -542,7 +543,7 @@ class DHTable(Displayable):
 
         In a modified table the constant pose of a row comes before the row's motion. The motion of a revolute
         joint is a rotation by theta. The motion of a prismatic joint is a translation by d. The constant pose
-        of a row is the product of the transforms of its other cells.
+        of a row is the product of the transforms of all cells except the variable.
         """
         steps: list[FloatArray | Motion] = [self.base]
         for row in self.rows:

@@ -8,10 +8,11 @@ its index. The pose of frame j in frame i is
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
 The common normal to the first moving child of link i defines x_i, so gamma and b of this child are zero. For
-a chain without branches, the rows are the rows of the modified table, with a(i-1) = d and d(i) = r. The
-number sigma is the joint's kind: 0 revolute (theta), 1 prismatic (r), 2 fixed. A fixed joint uses all six
-numbers, so every frame of the robot is exact. The angle beta is not part of the original notation. It is zero
-except between nearly parallel axes (Hayati), where the other numbers would need offsets of kilometres.
+a chain without branches, the table equals the modified Denavit-Hartenberg table; d is then a(i-1), and r is
+d(i). The number sigma is the joint's kind: 0 revolute (theta), 1 prismatic (r), 2 fixed. The row of a fixed
+joint contains all six numbers, so the frame of each fixed link is exact too. The angle beta is not part of
+the original notation. The angle beta is zero except between nearly parallel axes (Hayati). Without beta,
+nearly parallel axes would need offsets of kilometres.
 
 `document`, `as_csv` and `as_mapping` return the table as a document, as CSV and as plain data.
 """
@@ -100,8 +101,8 @@ class TreeParameters:
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row. The frame of
             a row has z along the joint's axis and x along the common normal.
         left_out: Tilts that are not larger than rounding errors are replaced by zero
-            (`urdfkin.dh.common_normals`). This attribute is the sum (rad) of these tilts on the path with the
-            largest sum.
+            (`urdfkin.dh.common_normals`). For each path from the root, these tilts are added. This attribute
+            is the largest sum (rad).
     """
 
     robot: str
@@ -118,10 +119,10 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error of the rows on the longest path and of the last link, in eps * reach.
+        """Estimated rounding error of the poses on the longest path, in eps * reach.
 
-        The estimate is larger than every measured error, but an error can be larger in the worst case. It
-        does not include Pinocchio's rounding errors.
+        All errors measured so far are smaller than this estimate. It is not a proven bound. It does not
+        include Pinocchio's rounding errors.
         """
         deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + deepest) + self.left_out / EPS
@@ -223,11 +224,12 @@ class _Link:
 
     Attributes:
         antecedent: Index of the nearest moving link towards the root; -1 is the root.
-        T_antecedent_axis: (4, 4) pose of the axis frame in the antecedent's axis frame.
+        T_antecedent_axis: (4, 4) pose of this axis frame in the axis frame of the antecedent, the nearest
+            moving link towards the root.
         T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
         noise: Noise of `T_antecedent_axis`.
         left_out: Tilts that are not larger than rounding errors are replaced by zero. This attribute is the
-            sum (rad) of these tilts from the root to this link.
+            sum (rad) of the replaced tilts between the root and this link.
     """
 
     antecedent: int
@@ -259,8 +261,8 @@ def _links(tree: KinematicTree) -> list[_Link]:
 def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
-    The transform is that from the antecedent's axis to the joint's axis. The angle and the offset describe
-    the frame of a row relative to the axis frame of its link.
+    The transform leads from the axis of the antecedent (the nearest moving link towards the root) to the
+    joint's axis. The angle and the offset lead from the axis frame of a link to the frame of its row.
 
     The first moving child of a link defines the link's x axis. For a link without a moving child, x is chosen
     so that theta = 0.
@@ -289,7 +291,6 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
 def _row(
     tree: KinematicTree, j: int, i: int, step: Step, own: dict[int, tuple[float, float]], *, way: float
 ) -> TreeRow:
-    """Return the row of joint j with antecedent i."""
     joint = tree.joints[j]
     turn, shift = own.get(i, (0.0, 0.0))
     own_turn, own_shift = own.get(j, (0.0, 0.0))
@@ -364,7 +365,7 @@ def _headings(table: TreeParameters, units: Units) -> list[str]:
 def _cells(table: TreeParameters, j: int, units: Units) -> list[str]:
     row = table.rows[j]
     theta, r = units.angle(row.theta), units.length(row.r)
-    # The constant in a mimic joint's cell includes the offset of the mimic rule, as in all tables.
+    # The constant in a mimic joint's cell includes the offset of the mimic rule.
     own = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
     if row.sigma == 0:
         theta = added(own, units.angle(row.theta + row.offset))

@@ -46,7 +46,7 @@ class Units:
     """Format of the numbers in a printed table; radians and metres by default.
 
     Attributes:
-        angles: Radians (exact multiples of pi/12 as fractions of pi) or degrees.
+        angles: Radians or degrees. In radians, exact multiples of pi/12 are written as fractions of pi.
         lengths: Metres or millimetres.
         digits: Significant digits.
         columns: Order of the columns in printed tables.

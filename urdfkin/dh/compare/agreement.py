@@ -3,7 +3,8 @@
 `max_tip_error_bound` proves a bound of the tip error for every configuration, by the method of `urdfkin
 same`. The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches
 the joints of the two mechanisms without a fit. It then computes an upper bound of the tip error that the
-differences cause. The computation uses support functions and goes from joint to joint, from tip to base.
+differences cause. The computation begins at the tip and proceeds joint by joint to the base. At each joint it
+uses support functions.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
-#: Default tolerance for the tip's position (metres).
-#: The error of a table with one or two cells rounded to 0.1 mm is two thirds of this tolerance.
+#: Default tolerance for the tip's position (metres). If one or two cells of a table are rounded to 0.1 mm,
+#: the tip error is two thirds of this tolerance.
 TOLERANCE = 2e-4
 #: Number of configurations for a fit, and number of other configurations for the check of the fit.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
@@ -50,8 +51,8 @@ _EXPLAINS = 0.5
 _LEFT = 0.05
 #: Smallest change of a cell that is reported, relative to the reach. It is a tenth of `EXPLAINED`.
 _MOVED = 1e-10
-#: A tip that moves by less than this fraction of the path length counts as fixed. For such a tip, the reach
-#: is the length of the path.
+#: A tip that moves by less than this fraction of the path length is treated as fixed. For such a tip, the
+#: reach is the length of the path.
 _FIXED_TIP = 1e-6
 #: Range in which a prismatic joint without limits is sampled (metres).
 _SLIDE = (-0.5, 0.5)
@@ -130,7 +131,7 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
 
     To be fast, the fit tries only a few combinations of joint signs and directions of x. If two axes nearly
-    coincide, it does not try to rotate their joint offsets in opposite directions.
+    coincide, the fit does not try large opposite changes of their two joint offsets.
 
     Args:
         chain: The path.
@@ -155,9 +156,9 @@ def _off(fitted: Model, written: Model, judged: TargetPoses) -> dict[str, float]
 def _reach(chain: FrameChain, wanted: FloatArray) -> float:
     """Return the robot's reach, which converts radians to metres.
 
-    A URDF made from a table without Hayati rows may have offsets of kilometres that cancel. The path length
-    along the links is then far larger than the reach. The reach is therefore the spread of the tip's
-    positions.
+    A URDF made from a table without Hayati rows may contain an offset of kilometres, and a second offset that
+    compensates it. The path length along the links is then far larger than the reach. The reach is therefore
+    the spread of the tip's positions.
     """
     tips = wanted[:, :3, 3]
     across = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -165,7 +166,7 @@ def _reach(chain: FrameChain, wanted: FloatArray) -> float:
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
-    """Check that a table and a path have the same number and kinds of joints, and at least one.
+    """Check that a table and a path have the same number (at least one) and the same kinds of joints.
 
     Raises:
         InputError: the joints are different.
@@ -227,10 +228,10 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
     """Return the index of the row that contains a cell in the reference table.
 
-    In a standard table, row i contains this cell.
+    In a standard table, row i contains the cell.
 
-    A modified table contains a, alpha and beta of row i in row i + 1. The result is the number of rows if no
-    row contains the cell.
+    In a modified table, the cells a, alpha and beta of the standard row i are in row i + 1. If no row
+    contains the cell, the result is the number of rows.
     """
     return i + (reference.convention is Convention.MODIFIED and cell not in ("theta", "d"))
 

@@ -9,18 +9,18 @@ changes as few cells as possible.
 
 **Free parameters.** `fit_freedoms` fits base, tool and joint offsets, with the cells unchanged. The method is
 damped least squares (`urdfkin.kinematics.least_squares`) on the tip's twists. Two joints with nearly
-coinciding axes have nearly the same effect. Let one offset increase by an angle, and let the other decrease
-by this angle. The tip then moves by at most the angle times the distance of the two axes. Such changes
-therefore change the error only slowly. To make long steps possible, the damping decreases while steps
-succeed. When the error no longer decreases, urdfkin adds a large angle to one offset of such a pair, and
-subtracts it from the other offset. Then it fits again.
+coinciding axes have nearly the same effect. If one joint offset increases by an angle and the other joint
+offset decreases by this angle, the tip moves by at most the angle times the distance of the two axes.
+Therefore, such a change of the two offsets reduces the error only slightly. To make long steps possible, the
+damping decreases while steps succeed. When the error no longer decreases, urdfkin adds a large angle to one
+of the two offsets, and subtracts the angle from the other offset. Then it fits again.
 
 **Signs.** `align` finds the joint signs and the directions of x with which a reference table fits the URDF.
 The author of a table has three choices that do not change the robot: the positive direction of a joint, the
 direction of x along a common normal, and the zero position of theta. The signs +1 and -1 represent the two
-possible directions. All signs together determine the zero positions of theta. Each combination of signs gives
-a table for the URDF. A beam search chooses the signs joint by joint. At each joint, it keeps the combinations
-whose tables are closest to the reference table.
+possible directions. The zero positions of theta follow from the signs of all joints and of all x axes. Each
+combination of signs gives a table for the URDF. A beam search chooses the signs joint by joint. At each
+joint, it keeps the combinations whose tables are closest to the reference table.
 """
 
 from __future__ import annotations
@@ -50,14 +50,15 @@ LONGEST_STEP = 0.5
 #: The fit of the cells ends after `_ROUNDS` steps. A step is an improvement if it reduces the error by more
 #: than the fraction `_BETTER`. A mean error of at most `_SOLVED`, relative to the reach, is treated as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
-#: A singular value counts as zero below this fraction of the largest singular value.
-#: `_FREE` applies to free parameters, `_CELLS` to cells.
+#: A singular value is treated as zero if it is below this fraction of the largest singular value. The
+#: fraction is `_FREE` in the fit of the free parameters, and `_CELLS` in the fit of the cells.
 _FREE, _CELLS = 1e-8, 1e-9
 #: Number of iterations; each iteration computes new weights of the cells. The smallest weight is the fraction
 #: `_STAYS` of the reach.
 _SPARSER, _STAYS = 25, 1e-9
-#: Weight of the last cell relative to the first cell. If two cells have the same effect, their weights
-#: differ. The solution then changes only one of the two cells.
+#: Weight of the last cell relative to the first cell. The weights increase from the first cell to the last
+#: cell. Therefore, if two cells have the same effect on the tip, the solution changes only one of these two
+#: cells.
 _LAST_WINS = 1.2
 #: Initial weight of beta, and the factor by which each iteration multiplies this weight.
 #: With a small weight, beta changes only if a change of alpha is not enough.
@@ -110,7 +111,8 @@ class Model:
     def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
         """Return the path from base to tip, and an array (s, 5 n) with the angles and lengths of its motions.
 
-        `values` (s, n) contains the joint values of s samples. Each cell of the table is one motion.
+        `values` (s, n) contains the joint values of s samples. Each cell of the table is the angle or length
+        of one motion.
         """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i in range(len(self.cells)):
@@ -155,14 +157,15 @@ class TargetPoses:
 def columns(
     model: Model, wanted: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, the twists of the free parameters, and the twists of the cells.
+    """Return the tip's poses, and their derivatives by the free parameters and by the cells, as twists.
 
-    Each array of twists has six rows for each sample, and a column for each number. A column is the
-    derivative of the tip's poses with respect to this number.
+    Each of the two arrays of derivatives has six rows for each sample, and a column for each parameter or
+    cell. The column contains the derivative of the tip's poses with respect to this parameter or cell.
 
     The free parameters are six numbers of the base, six of the tool, and the variable of each row. The cells
     are in row order: five cells of row 1, five cells of row 2, and so on. Angles are multiplied by the scale.
-    `frames` contains the poses along the model's path at the samples; None: they are computed.
+    `frames` contains the poses of all frames of the model at all samples. If `frames` is None, the function
+    computes these poses.
     """
     scale = wanted.scale
     path, amounts = model.path_at(wanted.values)
@@ -179,9 +182,10 @@ def columns(
 
 
 def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
-    """Return the change of the tip's pose when all parts after a frame are translated or rotated.
+    """Return the twists of the tip when the frame `at`, and everything after it, is translated or rotated.
 
-    The result (6 samples, 6) has a column for each translation and rotation along the axes of the frame.
+    The result (6 samples, 6) has three columns for translations along the axes of the frame, and three
+    columns for rotations about these axes.
     """
     arm = poses[:, :3, 3] - at[:, :3, 3]
     axes = np.swapaxes(at[:, :3, :3], 1, 2)
@@ -223,7 +227,7 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
 def _sparse(
     model: Model, start: Model, freedoms: FloatArray, cells: FloatArray, error: FloatArray, scale: float
 ) -> FloatArray:
-    """Return the changes of cells that remove the error left by the free parameters.
+    """Return the changes of cells that remove the error which remains after the fit of the free parameters.
 
     After these changes, as few cells as possible differ from the cells of `start`.
     """
@@ -252,9 +256,10 @@ def _span(freedoms: FloatArray) -> FloatArray:
 
 
 def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
-    """Return (row, cell index) of the cells whose change has the same effect as a change of free parameters.
+    """Return (row, cell index) of each cell whose value cannot be determined from the tip's poses.
 
-    The two effects on the tip differ by at most the fraction 1e-6.
+    For such a cell, some change of the free parameters has the same effect on the tip as a change of the
+    cell. Two effects are treated as the same if they differ by at most a millionth.
     """
     _, freedoms, cells = columns(model, wanted)
     Q = _span(freedoms)
@@ -273,9 +278,9 @@ def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | Non
     for i, own in enumerate(free[12:]):
         k = model.own(i)
         cells[i, k] += own * per_cell[k]
-    # The change of the base is a motion in the frame of the first revolute joint.
-    # The change of the tool is a motion in the frame of the last revolute joint.
-    # A rotation of base or tool about this joint's axis then exactly equals a change of the joint's offset.
+    # The change of the base is expressed in the frame of the first revolute joint. The change of the tool is
+    # expressed in the frame of the last revolute joint. A rotation of base or tool about this joint's axis
+    # then exactly equals a change of the joint's offset.
     base = _apply_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
@@ -292,7 +297,8 @@ _PATIENCE = 4
 _ROUNDING = 1e-13
 #: Arguments `count` and `beam` of `align` for a fast fit.
 HASTY = (3, 16)
-#: Tip error that counts as rounding, relative to the reach. The search ends when the error is this small.
+#: The search ends when the tip error is at most this fraction of the reach, because such an error is only
+#: rounding.
 _AT_ROUNDING = 1e-12
 #: Other joint signs than in the file are used only if they reduce the tip error to less than this fraction.
 _TWICE_AS_GOOD = 0.5
@@ -335,7 +341,7 @@ def fitted_model(
     best, best_size = written, size(written)
     for start in starts(chain, standard, written, *(HASTY if hasty else ())):
         # Least squares minimize the sum over all samples, but models are compared by their worst sample.
-        # Therefore, the start may be better than the fit.
+        # Therefore, the model before the fit may be better than the fitted model.
         model = min(fit_freedoms(start, wanted, turns=not hasty), start, key=size)
         needed = 1.0 if start is written else _TWICE_AS_GOOD
         if (its_size := size(model)) < needed * best_size:
@@ -346,7 +352,7 @@ def fitted_model(
 
 
 def ends_gathered(model: Model, written: Model) -> Model:
-    """Move the fitted offset of the first joint into the base, and that of the last joint into the tool."""
+    """Move the fitted offset of the first joint into the base, and of the last joint into the tool."""
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
     step = between_axes(a, alpha, beta)
@@ -427,9 +433,9 @@ def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, floa
 
 
 def _opposite_rotations(model: Model) -> list[Model]:
-    """Return models in which two consecutive joint offsets are rotated by opposite angles.
+    """Return models with an angle added to one joint offset and subtracted from the next joint offset.
 
-    If two consecutive axes nearly coincide, such a change has little effect on the tip.
+    If the axes of the two joints nearly coincide, this change has little effect on the tip.
     """
     found = []
     for i in range(len(model.cells) - 1):
@@ -451,7 +457,8 @@ REVERSAL = 1e-9
 #: A prismatic axis can be shifted freely. Differences of lengths next to such an axis are therefore
 #: multiplied by this small weight.
 _SLIDING = 1e-3
-#: Parallel axes with a smaller distance (metres) count as coinciding. The direction of x is then free.
+#: Parallel axes with a smaller distance (metres) are treated as coinciding. The direction of x can then be
+#: chosen.
 _NO_OFFSET = 1e-5
 #: Two candidates are equal if their numbers (metres, radians) agree after rounding to this number of
 #: decimals.
@@ -467,7 +474,8 @@ class Alignment:
     Attributes:
         senses: +1 or -1 for each joint. With -1, the reference's variable decreases if the URDF's joint value
             increases.
-        offsets: Offset of each joint at q = 0, to add to the reference's theta (d of a prismatic joint).
+        offsets: Constant of each joint that is added to theta in the reference table (to d for a prismatic
+            joint).
         base: (4, 4) pose of the reference's frame 0 in the URDF's base.
         tool: (4, 4) pose of the URDF's tip in the reference's last frame.
         cost: Sum of the differences between the cells of the two tables, in metres. Differences of angles are
@@ -483,19 +491,20 @@ class Alignment:
 
 @dataclass(frozen=True, slots=True)
 class _Partial:
-    """An alignment of the first part of the chain, up to one joint.
+    """An alignment of the first joints of the chain, which will be extended joint by joint.
 
     Attributes:
-        cost: Sum of the differences of the cells up to this joint (metres).
-        senses: Sign (+1 or -1) of each joint up to this joint.
-        offsets: Offsets of all joints before this joint.
-        phi_in: Rotation from this joint's DH frame to its URDF frame (rad).
-        carry: Offset from this joint's DH frame to its URDF frame (metres).
-        base: (4, 4) change of the base that replaces the offset of the first row.
-        absorber: Index of a row whose joint offset can have any value, and a sign. There is such a row if the
-            axes before the joint coincide, because only the sum of their joint angles is defined. The sign is
-            the direction in which this joint offset rotates x. For index 0, the base contains the joint
-            offset.
+        cost: Sum of the differences between the cells of the two tables (metres), for all rows before the row
+            of the last joint.
+        senses: Sign (+1 or -1) of each of these joints.
+        offsets: Offsets of these joints except the last joint.
+        phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
+        carry: Offset along z from the last joint's DH frame to its URDF frame (metres).
+        base: (4, 4) transform that becomes part of the base, instead of an offset in the first row.
+        absorber: (row index, sign) for a row whose joint offset can be chosen freely. None if no joint offset
+            can be chosen. If axes before the last joint coincide, only the sum of their joint angles is
+            defined, so one joint offset can be chosen. The sign says in which direction this joint offset
+            rotates x. If the index is 0, the joint offset is part of the base.
     """
 
     cost: float
@@ -546,8 +555,8 @@ def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
     """
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
-        # If there is an absorber, its joint offset can reverse x. The two directions of x are then
-        # equivalent.
+        # If `absorber` names a row, the joint offset of this row can reverse x. The two directions of x are
+        # then equivalent.
         circle = math.pi if one.absorber else 2.0 * math.pi
         ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
         found.setdefault((one.senses, one.absorber, *ahead), one)
@@ -598,7 +607,6 @@ def _extend(
 
 
 def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, float] | None:
-    """Return the attribute `absorber` of the alignment up to joint i + 1."""
     if not step.free:
         return None
     sign = math.copysign(1.0, math.cos(step.alpha))
@@ -608,10 +616,10 @@ def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, 
 
 
 def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
-    """Set theta of a prismatic joint to the table's theta.
+    """Set theta of a prismatic joint to theta in the reference table.
 
-    Without an absorber, the alignment is unchanged. Otherwise, the joint offset of the absorber changes by
-    the difference of the two angles.
+    The joint offset of the row in `partial.absorber` changes by the difference between the old and the new
+    theta. If `partial.absorber` is None, the alignment is unchanged.
     """
     if partial.absorber is None:
         return partial
@@ -628,13 +636,14 @@ def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
 def _steps(
     A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, placed: bool
 ) -> Iterator[Step]:
-    """Yield the possible steps between two axes, with both directions of x.
+    """Yield the possible transforms (`Step`) between two axes, with both directions of x.
 
-    If the axes are nearly parallel in the URDF and in the reference table, a Hayati step is also tried. It
-    begins at the offset d of the reference table. In this step the direction of x is free if the distance of
-    the axes is nearly zero. The direction of x is also free if a joint is prismatic, because its axis can be
-    shifted; `placed` is then False. If beta is 0 in the reference row, a step along the common normal is
-    tried as well. A shift of a prismatic axis does not change the direction of the common normal.
+    If the axes are nearly parallel in the URDF and in the reference table, the function yields the transform
+    of a Hayati row. The x axis of this row is at the offset d of the reference table. If the distance of the
+    axes is nearly zero, the direction of x can be chosen freely. The argument `placed` is False if one of the
+    joints is prismatic. The axis of a prismatic joint can be shifted, so the direction of x can then be
+    chosen too. If beta is 0 in the reference row, the function also yields the transform along the common
+    normal. A shift of a prismatic axis does not change the direction of the common normal.
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])
@@ -646,7 +655,7 @@ def _steps(
         lifted[2, 3] -= delta
         if math.hypot(lifted[0, 3], lifted[1, 3]) < _NO_OFFSET or not placed:
             lifted[:2, 3] = 0.0
-        # With reach 0, each pair of axes that are not exactly parallel gets a Hayati step.
+        # With reach 0, `step_between` makes a Hayati row for all axes that are not exactly parallel.
         cut = step_between(lifted, reach if sine < NEARLY_PARALLEL else 0.0, NearParallel.HAYATI, phi_free)
         steps.append(replace(cut, delta=cut.delta + delta))
     for step in steps:

@@ -1,9 +1,10 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-A fit of base, tool, joint offsets and joint signs compensates for most wrong signs of cells. A table with a
-wrong sign therefore agrees with the URDF after the fit. After its correction, the table agrees even if fewer
-parameters are fitted. Usually, no parameter must be fitted. `Search` therefore tries each single change of
-the table. The likely mistakes are the changes after which the fewest parameters must be fitted.
+If a cell of a table has a wrong sign, the table often agrees with the URDF after a fit. The fit changes base,
+tool, joint offsets and joint signs so that they compensate for the wrong sign. After the correction of the
+sign, the table agrees even if fewer parameters are fitted. Usually, no parameter must be fitted. `Search`
+therefore tries each single change of the table. The likely mistakes are the changes after which the fewest
+parameters must be fitted.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from urdfkin.kinematics.rotation import log_rotation, polar_factor
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
-#: Two angles with a smaller difference (rad) count as equal.
+#: Two angles with a smaller difference (rad) are treated as equal.
 _SAME_ANGLE = 1e-9
 #: If there are more possible changes of the table than this number, joint offsets and joint signs are not
 #: fitted. A table of nine rows has about this number of possible changes.
@@ -64,12 +65,14 @@ class Search:
         The result is empty if no change reduces the number of these parameters.
 
         Some tables agree only after a fit of base, tool and joint offsets. Such a table has a mistake, or its
-        frames differ from the URDF's frames. The fit cannot distinguish these two cases. A change of such a
-        table is reported only if at most one of base and tool must be fitted after the change.
+        frames differ from the URDF's frames. The fit cannot distinguish these two cases. Therefore, a
+        correction of such a table is reported only if the corrected table agrees after a fit of only the
+        base, after a fit of only the tool, or without a fit.
 
         Args:
             reference: The table.
-            fit: Whether parameters may be fitted after a change.
+            fit: Whether base, tool, joint offsets and joint signs may be fitted after a correction of the
+                table.
             agrees: Whether the table agrees after a fit of base, tool, joint offsets and joint signs.
         """
         if self._agrees(_model(reference)):
@@ -194,7 +197,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    if len(reference.rows) > 3:  # for three rows, the reversed order is an exchange of two rows
+    if len(reference.rows) > 3:  # reversing three rows only exchanges the first and the last row
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))
     for kind, places, rows in orders:

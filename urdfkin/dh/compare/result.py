@@ -21,11 +21,12 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: If at most this error remains after a change of cells, the change explains the whole difference. The unit
-#: is rad for angles, and metres per metre of reach for positions. The rounding errors of a fit are far
-#: smaller than this number. The last digits in data sheets are far larger.
+#: If at most this error remains after a change of cells, these cells are the only difference between table
+#: and URDF. The unit is rad for angles, and metres per metre of reach for positions. The rounding errors of a
+#: fit are far smaller than this number. The last digits in data sheets are far larger.
 EXPLAINED = 1e-9
-#: Finest resolution of printed fitted numbers: rad for angles, metres per metre of reach for lengths.
+#: Fitted numbers are printed with this resolution, or with a coarser resolution. The unit is rad for angles,
+#: and metres per metre of reach for lengths.
 _FINEST = 1e-12
 #: Half a unit of the last digit, with a margin for the rounding of decimal numbers to doubles.
 _HALF = 1.0 + 1e-6
@@ -41,8 +42,7 @@ class CellDifference:
         cell: "a", "alpha", "d", "theta" or "beta".
         reference: The table's value (metres or radians).
         urdf: The URDF's value (metres or radians).
-        tip: Displacement (metres) of the tip that this difference alone causes, at the sample with the
-            largest displacement.
+        tip: Largest displacement (metres) of the tip in the sampled configurations if only this cell differs.
         last_digit: Half a unit of the value's last digit in the table's file (metres or radians). 0 if the
             value is exact, or if its text is unknown.
     """
@@ -150,26 +150,27 @@ class Comparison:
         offsets: Offset of each joint (radians or metres).
         base: Distance and angle by which the fit moved the base.
         tool: Distance and angle by which the fit moved the tool.
-        metres: Largest position error (metres) of the tip on all samples, for the fitted table.
-        radians: Largest orientation error (radians) of the tip on all samples, for the fitted table.
+        metres: Largest position error (metres) of the fitted table's tip in all sampled configurations.
+        radians: Largest orientation error (radians) of the fitted table's tip in all sampled configurations.
         most_metres: Proven upper bound (metres) of the tip's position error for all joint values and the
             fitted table. The bound does not include rounding errors (`urdfkin.dh.compare.agreement`).
         most_radians: Proven upper bound (radians) of the tip's orientation error for all joint values and the
             fitted table. The bound does not include rounding errors.
-        written_metres: Largest position error (metres) of the tip on all samples, for the unfitted table.
-        written_radians: Largest orientation error (radians) of the tip on all samples, for the unfitted
-            table.
+        written_metres: Largest position error (metres) of the unfitted table's tip in all sampled
+            configurations.
+        written_radians: Largest orientation error (radians) of the unfitted table's tip in all sampled
+            configurations.
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
-            fitted. The list is empty if such changes do not explain the difference, or if too many cells
+            fitted. The list is empty if changes of cells do not remove the tip error, or if too many cells
             would have to change.
-        hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. A
-            change of base, tool or joint offsets has the same effect on the tip as a change of this cell.
-        mistakes: The likely mistakes. After the correction of a likely mistake, the fewest parameters must be
-            fitted.
+        hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. If such
+            a cell has another value, base, tool and joint offsets can compensate for the difference.
+        mistakes: The likely mistakes. A mistake is likely if its correction leaves the smallest number of
+            parameters to fit.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
-            cells explain the whole difference, only rounding errors remain.
+            cells are the only difference, the remaining error is only rounding.
         tolerance: Tolerance at the tip (metres).
         samples: Number of configurations at which the fitted table was checked.
     """
@@ -197,7 +198,7 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the table agrees with the URDF on all samples.
+        """Whether the table agrees with the URDF in all sampled configurations.
 
         The table agrees if the position error, and the orientation error multiplied by the reach, are within
         `tolerance`.
@@ -211,7 +212,7 @@ class Comparison:
 
     @property
     def rounding(self) -> float:
-        """Error that counts as rounding: radians for angles, metres per metre of reach for lengths."""
+        """Limit below which errors are treated as rounding: radians, or metres per metre of reach."""
         return EPS * of_a_fit(len(self.reference.rows))
 
     @property
@@ -407,7 +408,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
     """Format an offset at the resolution `fine`.
 
-    The offset is written as a fraction of pi if the two are equal at this resolution.
+    If an angle differs from a multiple of 15 degrees by at most `fine`, it is written as a fraction of pi.
     """
     if abs(offset) <= fine:
         return "0"

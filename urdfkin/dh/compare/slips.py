@@ -1,10 +1,11 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
-An *interpretation* of a table consists of a convention, units and column names. With each interpretation, the
-table describes a robot of another *shape*. The shape consists of the distances and angles of consecutive
-axes, and of the offsets along the axes between common normals. A change of joint signs, joint offsets, base
-or tool does not change the shape. The shape is fast to compute. Therefore, urdfkin first compares the shapes
-with the URDF's shape. It then fits only the few interpretations with the most similar shapes.
+An *interpretation* of a table consists of a convention, units and column names. In each interpretation, the
+numbers of a table describe a robot with a different *shape*. The shape of a robot consists of three kinds of
+numbers: the distances of consecutive axes, the angles between them, and the offsets along the axes. A change
+of joint signs, joint offsets, base or tool does not change the shape. The shape is fast to compute.
+Therefore, urdfkin first computes the shape for each interpretation, and compares it with the URDF's shape. It
+then fits only the few interpretations whose shapes are closest to the URDF's shape.
 
 `other_readings` changes the convention, units or column names of the table's plain data (`urdfkin.dh.rows`).
 It then parses the data again. The parser rejects an interpretation with an impossible value, such as an angle
@@ -41,7 +42,8 @@ from urdfkin.model.tree import FloatArray
 #: parallel. `_WORTH` is the relative cost of each difference between an interpretation and the file, for
 #: example another unit.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
-#: An interpretation explains a disagreement if it leaves at most this fraction of the tip error.
+#: An interpretation is returned only if its tip error is within the tolerance, or is at most this fraction of
+#: the original tip error and of the reach.
 _EXPLAINS = 0.05
 
 
@@ -52,8 +54,9 @@ class CommonMistake:
     Attributes:
         reading: The interpretation with which the table agrees with the URDF.
         said: The interpretation that the table's file states.
-        metres: Position error of the tip at the worst sample, after a fit of base, tool and offsets.
-        radians: Orientation error of the tip at the worst sample.
+        metres: Largest position error of the tip in the sampled configurations, after a fit of base, tool and
+            offsets.
+        radians: Largest orientation error of the tip in the sampled configurations, after this fit.
     """
 
     reading: ConventionHypothesis
@@ -89,8 +92,8 @@ def diagnose(
         chain: The path of the URDF.
         data: The table's plain data from `urdfkin.dh.parse_table.mapping_from_text`.
         tolerance: Tolerance at the tip (metres).
-        off: Tip error of the table as its file states it (metres). The returned interpretation leaves at most
-            5 % of this error.
+        off: Tip error of the table as its file states it (metres). With the returned interpretation, the tip
+            error is at most 5 % of this error, or within `tolerance`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     own = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
@@ -170,9 +173,10 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     Lengths are in metres, and angles are in radians times `scale`. For each pair of consecutive axes, the
     result contains the distance and the angle of the two axes. For each axis that is parallel to neither of
     its neighbours, the result also contains the offset along the axis. Offsets along consecutive parallel
-    axes are summed. A prismatic joint has no fixed axis line. Therefore, distances from the axis of a
-    prismatic joint are set to zero, and so are offsets along the neighbouring axes. The offset along the
-    first axis is left out, because a change of the base has the same effect.
+    axes are summed. A prismatic joint has no fixed axis line. Therefore, the distance from a prismatic
+    joint's axis to the next or previous axis is set to zero. The offsets along the neighbouring axes are also
+    set to zero. The offset along the first axis is left out, because a change of the base has the same
+    effect.
     """
     rows = to_convention(table, Convention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False
@@ -191,8 +195,8 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     return np.array(numbers)
 
 
-#: From a row, an interpretation uses only the keys `_CELLS`. The keys `_ENDS` of a table are ignored, because
-#: base and tool are fitted.
+#: Only the keys `_CELLS` of a row are used. The keys `_ENDS` of a table are ignored, because base and tool
+#: are fitted.
 _CELLS = ("joint", "kind", "sense", "beta", *ORDER)
 _ENDS = ("base", "tool", "coordinates")
 
@@ -227,7 +231,7 @@ class ConventionHypothesis:
     def slips(self, other: ConventionHypothesis) -> int:
         """Return the number of differences between two interpretations.
 
-        Two exchanged columns count as one difference.
+        Two exchanged columns are counted as one difference.
         """
         moved = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
         return len(self._differences(other)) + (moved + 1) // 2

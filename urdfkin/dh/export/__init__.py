@@ -12,8 +12,8 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: For each format: the module with its function `write_NAME`, and a summary in one line.
-#: The module is "" if the format is a language of `urdfkin export`.
+#: For each format: the module with its function `write_NAME`, and a summary in one line. If the format is a
+#: language of `urdfkin export`, the name of the module is "".
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": ("urdfkin.dh.export.text", "aligned text"),
     "markdown": ("urdfkin.dh.export.text", "a Markdown table"),

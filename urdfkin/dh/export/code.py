@@ -83,15 +83,15 @@ def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> lis
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
 
 
-#: Largest denominator and largest integer of a number that is written as a fraction.
-#: Other numbers are written as decimals.
+#: Integers below this number are written as integers. Numbers with at most this denominator are written as
+#: fractions. Other numbers are written as decimals.
 _LONGEST = 10**9
 
 
 class Fractions(Units):
     """SymPy's exact multiples of pi, and exact fractions (0.425 is 17/40).
 
-    Angles that are no such multiples are decimals. Numbers with many digits are decimals too.
+    Other angles, and numbers with many digits, are decimals.
     """
 
     def length(self, metres: float) -> str:
@@ -108,7 +108,7 @@ class Fractions(Units):
         return ("-" if radians < 0.0 else "") + self.decimal(abs(radians))
 
     def ratio(self, x: Fraction) -> str:
-        """Format a number of few digits as a fraction."""
+        """Format a fraction."""
         return f"Rational({x.numerator}, {x.denominator})"
 
     def decimal(self, x: float) -> str:

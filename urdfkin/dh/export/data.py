@@ -68,7 +68,7 @@ def _row(row: DHRow) -> dict[str, Any]:
         data["mimic"] = asdict(row.mimic)
     if row.limit is not None:
         names = ("lower", "upper", "velocity", "effort")
-        # JSON has no infinity; a missing limit is infinite.
+        # JSON cannot store infinity, so an infinite limit is left out.
         limits = {name: getattr(row.limit, name) for name in names}
         data["limit"] = {name: value for name, value in limits.items() if math.isfinite(value)}
     return data

@@ -57,7 +57,7 @@ def variable(
 def coordinate_names(table: DHTable) -> str:
     """Return a text with the joint of each coordinate, such as "with q1 = left, q2 = right".
 
-    The text is empty if the coordinates are the rows' joints in order.
+    The text is empty if the coordinates are the joints of the rows, in row order.
     """
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
