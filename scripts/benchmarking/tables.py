@@ -21,8 +21,8 @@ from scripts.pages import table as markdown
 Entry = Mapping[str, Any]
 _SHARE = "times generated code"
 NOT_MEASURED = "Not measured yet."
-#: Pattern of urdfkin's name in the measurements with all threads.
-#: The name contains the number of threads of the measuring machine.
+#: Pattern of urdfkin's name in the measurements with all threads. The name contains the number of threads
+#: that the benchmark used.
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 
 
@@ -195,7 +195,9 @@ def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
                 "operations per ns": number(operations[title] / ns),
             }
         )
-    return Words("floor", "lower limit of the time: bytes and operations of one configuration", cells)
+    return Words(
+        "floor", "lower limits of the time for one configuration, from its bytes and its operations", cells
+    )
 
 
 # -- where the time goes ---------------------------------------------------------------------------------

@@ -118,7 +118,7 @@ def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.War
     if (reason := robot.verifier.cannot()) is not None:
         return Outcome("Pinocchio refuses a file that check accepts", reason)
     texts = "; ".join(str(w.message) for w in warned)
-    return Outcome("not verified, without a finding that states the reason", texts)
+    return Outcome("not verified, and no finding states the reason", texts)
 
 
 # -- all quantities ----------------------------------------------------------------------------------------

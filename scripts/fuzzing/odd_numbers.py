@@ -97,7 +97,10 @@ def odd_factor(rng: random.Random) -> float:
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
-    """Return limits of a joint that are equal, one ulp apart, far apart or infinite, and rarely reversed."""
+    """Return random limits of a joint: equal, one unit in the last place apart, far apart, or infinite.
+
+    A few are reversed.
+    """
     a = odd_angle(rng) if turns else odd_length(rng)
     b = odd_angle(rng) if turns else odd_length(rng)
     if rng.random() < 0.02:

@@ -76,7 +76,7 @@ def slips(tree: ast.Module) -> list[Slip]:
 
 
 def mutated(source: str, number: int) -> ast.Module:
-    """Return a file's tree with one mutant applied."""
+    """Return the syntax tree of a file with one small mistake (a mutant) in it."""
     tree = ast.parse(source)
     slips(tree)[number].make()
     return ast.fix_missing_locations(tree)

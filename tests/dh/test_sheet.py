@@ -306,7 +306,9 @@ def test_a_table_given_as_robot_is_written_as_it_stands(tmp_path: Path) -> None:
     "header", ["a;alpha,d,theta", "a,alpha;d,theta", "a_i;alpha,d,theta", "a|alpha,d,theta"]
 )
 def test_headings_with_mixed_separators_are_refused(header: str) -> None:
-    with pytest.raises(InputError, match="the line of column headings is not separated like the other lines"):
+    with pytest.raises(
+        InputError, match="the line of column headings has another separator than the other lines"
+    ):
         table_from_text(f"# convention: standard\n{header}\n0,pi/2,0.1,0\n", ".csv")
 
 

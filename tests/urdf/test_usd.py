@@ -985,7 +985,9 @@ def test_openusds_parser_notices_a_slip_of_our_reader(
 
     monkeypatch.setattr(usd._Reader, "_side", wrong_side)
     monkeypatch.setattr(usd._Reader, "_motion", wrong_motion)
-    with pytest.raises(OracleError, match="OpenUSD's parser of UsdPhysics reads another joint"):
+    with pytest.raises(
+        OracleError, match="OpenUSD's parser of UsdPhysics and urdfkin disagree about this joint"
+    ):
         slipped(monkeypatch, path)
 
 

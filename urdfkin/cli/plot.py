@@ -61,7 +61,7 @@ EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.sv
     type=Number(),
     default=1.0,
     show_default=True,
-    help="With --to: duration of the line in seconds.",
+    help="With --to: duration of the motion in seconds.",
 )
 @click.option(
     "--samples",

@@ -43,7 +43,7 @@ _AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Attributes of a joint that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: Names of those changes that move a link, for files of two formats.
+#: If the files have different formats, changes with these names move a link.
 _MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str

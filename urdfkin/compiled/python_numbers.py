@@ -1,4 +1,4 @@
-"""Number types with which Python runs the recursion without a compiler, for one configuration at a time.
+"""Number types for one configuration, with which the recursion runs in Python without compilation.
 
 Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A
 product x y is not computed at once. In the sum x y + z, the product and the sum are one fused multiply-add,

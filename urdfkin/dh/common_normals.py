@@ -353,7 +353,7 @@ def steps_like(
             table. None: these two numbers may differ, and the last row or the tool contains the difference.
 
     Returns:
-        The numbers of the transforms between consecutive axes, and theta of each row.
+        The parameters of the transforms between consecutive axes, and theta of each row.
     """
     steps, inputs = list[Step](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):

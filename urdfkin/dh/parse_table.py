@@ -180,7 +180,7 @@ def _no_header(lines: list[str]) -> InputError:
     missing = next((name for name in ORDER if name not in names), None)
     if missing is None:
         return InputError(
-            "the line of column headings is not separated like the other lines",
+            "the line of column headings has another separator than the other lines",
             where="header",
             found=", ".join(best)[:200],
             remedy="separate the cells of all lines by the same character: a comma, a semicolon, a tab"

@@ -114,8 +114,8 @@ def _has_gpu() -> bool:
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
     """Compile and run a file of C, C++ or CUDA, in single and in double precision.
 
-    The system's compiler treats all warnings as errors. CUDA's kernels run if there is a GPU; if not, only
-    the functions of the host run.
+    The system's compiler treats all warnings as errors. CUDA's kernels run if there is a GPU. Without a GPU,
+    only the functions for the processor are checked.
     """
     found = _MAIN.search(text)
     if found is None:

@@ -54,7 +54,7 @@ class PiMultiple:
 
 
 class ExactGraph(Graph):
-    """The expressions of a function with exact constants.
+    """The expressions of a function. Their constants are exact numbers, not doubles.
 
     Attributes:
         recognised: The angles of the URDF that were replaced by multiples of pi, and these multiples.

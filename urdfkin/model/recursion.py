@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: A slice of q, v or a that starts with the numbers of one joint.
+#: The part of the array q, v or a from the first number of a joint to the end.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)

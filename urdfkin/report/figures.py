@@ -49,7 +49,8 @@ def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
             figure,
             prefix,
             f"Distribution of the disagreement with Pinocchio, {robot['source']}",
-            f"Histograms in eps*scale for each quantity, against the bound. {'; '.join(descriptions)}.",
+            "Histograms of the disagreements of each quantity, in eps*scale, with the bound. "
+            f"{'; '.join(descriptions)}.",
         )
 
 

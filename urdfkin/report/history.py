@@ -47,7 +47,7 @@ _LOWEST = -3.0
 class Run(TypedDict):
     """One validation run, as the history lists it."""
 
-    file: Annotated[str, says("The report: a file, or the folder of a store.")]
+    file: Annotated[str, says("The report: a JSON file, or the folder of `validate --store`.")]
     started: Annotated[str, says("Start time, ISO 8601, UTC.")]
     verdict: Annotated[str, says("The verdict of the run.")]
     reason: Annotated[str | None, says("Why the run has not passed; null if it has.")]
@@ -126,8 +126,8 @@ class History:
 
     Attributes:
         runs: The runs, the oldest first.
-        robots: For each robot, the results in each run. The key is the robot's latest source. Worse verdicts
-            come first.
+        robots: For each robot, the results in each run. The key is the path or name from which the robot was
+            loaded in the latest run. Worse verdicts come first.
         unusable: Files that cannot be used, with the reason.
         repeated: Files that repeat the run of another file. The value is the name of the other file.
     """

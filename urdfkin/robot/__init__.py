@@ -405,7 +405,10 @@ class Robot(Displayable):
         return self._tip_frame
 
     def _default_frame(self) -> str:
-        """Return the catalogue's tip or the only leaf; raise InputError if there are several leaves."""
+        """Return the tip that the catalogue names, or the only leaf link.
+
+        Raise InputError if there are several leaves.
+        """
         if not self._has_one_tip:
             leaves = [self.tree.frame_name(leaf) for leaf in self.tree.leaves()]
             raise InputError(

@@ -51,7 +51,7 @@ def installed_version(package: str) -> str | None:
         for name in os.listdir(entry):  # noqa: PTH208  pathlib takes longer
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    from importlib import metadata  # noqa: PLC0415  imports modules that files in the current folder could replace
+    from importlib import metadata  # noqa: PLC0415  at the start, a file in the current folder could replace its modules
 
     try:
         return metadata.version(package)

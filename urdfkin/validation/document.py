@@ -335,7 +335,9 @@ class Check(TypedDict):
     ]
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
-        says("Tightest and widest bound of a disagreement in eps * scale; null if nothing was compared."),
+        says(
+            "Smallest and largest error bound of the results, in eps * scale; null if nothing was compared."
+        ),
     ]
     histogram: Annotated[
         list[Count],

@@ -160,7 +160,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
         Two values: a sentence for the certificate, and remarks about prims whose placements differ.
 
     Raises:
-        OracleError: OpenUSD's parser reads another joint.
+        OracleError: OpenUSD's parser and urdfkin disagree about a joint.
     """
     joints = read.answer["joints"]
     share = max((_demand(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
@@ -199,7 +199,7 @@ def _demand(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> 
 
 def _error(where: str, found: str) -> OracleError:
     return OracleError(
-        "OpenUSD's parser of UsdPhysics reads another joint than urdfkin",
+        "OpenUSD's parser of UsdPhysics and urdfkin disagree about this joint",
         where=where,
         found=found,
         remedy="please report this as an error of urdfkin, with the file",

@@ -195,7 +195,7 @@ class UnguardedError(UrdfkinError, RuntimeError):
         super().__init__(
             f"the viewer cannot be secured: {what}",
             where=f"viser {_version()}",
-            remedy="pip install 'viser==1.1.1', which can be secured, and report this error to urdfkin",
+            remedy="pip install 'viser==1.1.1', which is secure, and report this error to urdfkin",
         )
 
 

@@ -168,7 +168,9 @@ _NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
-    """A robot in viser's scene: frames of the links with shapes or a skeleton, and overlays.
+    """A robot in viser's scene.
+
+    Each link has a frame with its shapes, or with a line to its parent if shapes are missing.
 
     Attributes:
         missing: Meshes that cannot be shown.

@@ -7,7 +7,8 @@ each proposal.
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other. Each subtree begins after a joint. The angle of this joint does not matter, because it can be added
 to the joint's zero offset. Therefore, the result depends only on the two joints and their axes. The search
-stores the result for each pair of joints, so it computes few results even for long chains.
+stores the result for each pair of joints and never computes it twice. It is therefore fast, even for long
+chains.
 """
 
 from __future__ import annotations

@@ -182,7 +182,7 @@ class MechanismMatcher:
                     yield base, X
 
     def _most(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the number of agreeing joints and links, for a start at two bodies.
+        """Return an upper bound on the joints and links that match if the matcher starts at two bodies.
 
         Each branch at one body is matched with at most one branch at the other body. In two matched branches,
         at most all joints and all links of the smaller branch agree. The sum of these numbers is largest if
