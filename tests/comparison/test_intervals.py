@@ -16,12 +16,14 @@ from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
 from tests.comparison.searching import far, searched
 from tests.reading import present
+from tests.urdfs import joint, limit, loaded, mimic
+from tests.urdfs import robot as urdf
 from urdfkin.comparison.bounds import Boxes, Search, curvature, moved_together, tightened
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
 from urdfkin.model.mechanisms.matcher import align
-from urdfkin.model.mechanisms.mechanism import FramePair, Screw, along, variables_of
+from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, FramePair, Gauge, Screw, along, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, Grid, point, upper_bounds
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -111,9 +113,11 @@ def searched_boxes(name: str, what: str, link: str) -> tuple[Search, FramePair]:
     return laid(robot(name), b, link)
 
 
-def laid(a: urdfkin.Robot, b: urdfkin.Robot, link: str) -> tuple[Search, FramePair]:
+def laid(
+    a: urdfkin.Robot, b: urdfkin.Robot, link: str, gauge: Gauge | None = None
+) -> tuple[Search, FramePair]:
     judge = Comparator((a, b), {}, bounds=True)
-    found = align(*judge.mechanisms, {})
+    found = align(*judge.mechanisms, {}, gauge)
     frame = next(one for one in found.frames if a.tree.links[one.a] == link)
     return judge.search(found, variables_of(found, judge.tolerance)), frame
 
@@ -252,6 +256,21 @@ def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> Non
     assert tightened(search, frame, 1.05 * lower, upper) == 1.05 * lower
     assert tightened(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"
     assert tightened(search, frame, 1.05 * lower, upper, most=0) == upper
+
+
+def test_a_joint_that_mimics_in_one_model_only_is_not_bounded_as_if_one_variable_moved_both() -> None:
+    def arm(place: str, inside: str) -> Robot:
+        first = joint("j1", "revolute", "base", "upper", f'xyz="{place} 0 0"', more=limit())
+        second = joint("j2", "revolute", "upper", "fore", more=limit() + inside)
+        return loaded(urdf(first, second, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis="")))
+
+    a, b = arm("0", mimic("j1")), arm("-5", "")
+    search, frame = laid(a, b, "tool", AS_WRITTEN)
+    q = a.sample(500, seed=0)
+    apart = b.placement(np.hstack([q, np.ones_like(q)]), "tool") - a.placement(q, "tool")
+    attained = float(np.linalg.norm(apart[:, :3, 3], axis=1).max())
+    assert attained > 5.5
+    assert tightened(search, frame, 5.3, 7.0) >= attained
 
 
 @pytest.mark.slow

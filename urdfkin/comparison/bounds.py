@@ -310,14 +310,16 @@ def curvature(
 ) -> tuple[list[str], FloatArray]:
     """Return the variables' names, and bounds (m) on the second derivatives of D by each pair of variables.
 
-    All bounds are inf if a variable moves two matched joints by different factors, or only one of them.
+    The bounds hold for matched joints that one variable moves by the same factor. If another pair of joints
+    has an effect on D, all bounds are inf.
     """
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     found = np.zeros((len(names), len(names)))
     for i, j, most in _second_derivatives(steps, pairs, variables, frame):
         if not most:
             continue
-        if not all(pairs[k].a.slope and pairs[k].a.slope == pairs[k].b.slope for k in (i, j)):
+        both = pairs[i], pairs[j]
+        if not all(one.variable and one.a.slope and one.a.slope == one.b.slope for one in both):
             return names, np.full_like(found, math.inf)
         bend = most * abs(pairs[i].a.slope * pairs[j].a.slope)
         at, to = (names.index(pairs[k].a.variable) for k in (i, j))
