@@ -5,8 +5,8 @@ Compute the Jacobian with respect to the parameters.
 A model is a path (`urdfkin.model.path`). A path is a product of constant poses and elementary motions. Each
 joint origin of a URDF is a product of this kind, and so is each row of a Denavit-Hartenberg table. The angle
 or length of an elementary motion is a parameter or a joint's value. A joint can have a gain g, which
-multiplies the joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the
-joint's value, multiplied by the joint's value.
+multiplies the joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the angle
+or length of the motion, multiplied by the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
 to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the

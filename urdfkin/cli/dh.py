@@ -83,8 +83,8 @@ choice_options = together(
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "For several parallel axes: add the offset along them to d of the last one, of the first one, or"
-        " of each.",
+        "For parallel axes: put the sum of the offsets along them into d of the last or of the first one,"
+        " or each offset into its own row.",
     ),
     click.option(
         "--flip",

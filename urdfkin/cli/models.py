@@ -48,7 +48,7 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--boxes",
     type=Whole(0),
-    help="Divide joint space into this number of boxes to bound distances (default 131072; 0: no bounds).",
+    help="Largest number of boxes of joint space in memory for bounds (default 131072; 0: no bounds).",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
 @click.option(

@@ -215,7 +215,7 @@ def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
     """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
 
     The arguments are reports (JSON files), the folders of `validate --store`, or folders that contain both.
-    Runs are ordered by their start. The command identifies a robot in all runs by the path of its file. If a
+    Runs are ordered by their start. The command identifies a robot in all runs by its source, a path or a name. If a
     file was renamed, the command uses the robot's name. Changes and regressions are defined as in `report
     compare`. With `--output history.html`, the command writes an offline page with charts.
 

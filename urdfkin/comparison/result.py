@@ -431,7 +431,7 @@ class Sameness(Displayable):
 
     @property
     def within_single(self) -> bool:
-        """Whether the models differ by less than the bound on the error of single precision.
+        """Whether the models differ, but no frame by more than the bound on the error of single precision.
 
         The models are compared as they are written. This bound is a sum of the rounding errors of all joints.
         An error in one joint can be smaller than this sum. Therefore, the property does not prove that
@@ -695,7 +695,7 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
 def _around(found: Alignment) -> set[tuple[int, int]]:
     """Return the matching frames of the root body that only describe how the robot is mounted.
 
-    Some of these frames are links before the first moving joint, counted from the root. The
+    Some of these frames are links before the first link to which a moving joint is attached. The
     other frames are links such as a world or a table: they carry no moving joint, and they have the same pose
     in the root frames of A and B.
     """

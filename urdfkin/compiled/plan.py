@@ -326,7 +326,7 @@ class Op(IntEnum):
     """The instructions of a program.
 
     For a translation or rotation there are four instructions: for the x axis, the y axis, the z axis, and any
-        axis.
+    axis.
     """
 
     END = 0

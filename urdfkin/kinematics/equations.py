@@ -168,12 +168,12 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: angular acceleration after a joint with angular velocity o; b is the rate of o."""
+    """7.129: angular acceleration after a joint with angular velocity o, of rate b in the moving frame."""
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130: acceleration after a joint with linear velocity u and angular velocity o; b is the rate of u."""
+    """7.130: acceleration after a joint with velocities u, o; b: rate of u in axes that turn with w + o."""
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 

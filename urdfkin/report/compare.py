@@ -249,7 +249,7 @@ class ChangeEntry(TypedDict):
 class ComparisonDocument(Header):
     """The output of `urdfkin report compare --format json`.
 
-    Its header entries are copied from the new report.
+    The header entry `sha256` lists the robots of the new report.
     """
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
@@ -418,7 +418,7 @@ def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
 
 
 def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
-    """Yield a change for each finding code (such as an error code) whose number of findings changed."""
+    """Yield a change for each code whose number of errors or warnings changed."""
     counts: list[dict[str, int]] = [{}, {}]
     for count, robot in zip(counts, (old, new), strict=True):
         for finding in robot["findings"]:

@@ -670,7 +670,7 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
     """Return a bool array (frames, 6, nv).
 
     The array is False for the entries of a Jacobian that are 0 for every q and every motion of the base. The
-    linear rows of a revolute column are z x d. In WORLD, d is the vector from the root to the joint. In the
+    linear rows of a revolute column are z x d. In WORLD, d is the vector from the joint to the root. In the
     other reference frames, d is the vector from the joint to the frame. The vector d is 0 for every q if the
     path between these points has no length and no prismatic joint.
     """

@@ -407,7 +407,7 @@ def _sparse(rows: FloatArray) -> FloatArray:
 def _basis(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the vector space that the rows of a matrix span.
 
-    Each row is the orthogonal projection of a unit vector.
+    The rows are orthogonal projections of orthonormal vectors.
     """
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding

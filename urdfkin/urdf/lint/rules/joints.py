@@ -589,8 +589,7 @@ FAR = 100.0
 TINY = 1e-4
 
 #: A limit that is a whole number, and at least `MANY`, is probably in degrees instead of radians. Limits of
-#: Limits of at least `ENDLESS` are not reported, because some exporters write them for a joint without
-#: limits.
+#: at least `ENDLESS` are not reported, because some exporters write them for a joint without limits.
 MANY, ENDLESS = 30.0, 1000.0
 
 #: If an angle is a rounded multiple of pi, the rounding moves the links below the joint. If it moves a link
