@@ -215,9 +215,9 @@ def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
     """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
 
     The arguments are reports (JSON files), the folders of `validate --store`, or folders that contain both.
-    Runs are ordered by their start. The command identifies a robot in all runs by its source, a path or a name. If a
-    file was renamed, the command uses the robot's name. Changes and regressions are defined as in `report
-    compare`. With `--output history.html`, the command writes an offline page with charts.
+    Runs are ordered by their start. The command identifies a robot by its source, which is a path or a name.
+    If a file was renamed, the command uses the robot's name. Changes and regressions are defined as in
+    `report compare`. With `--output history.html`, the command writes an offline page with charts.
 
     If a file cannot be used, the command prints its name and the reason, and shows the other files.
     Exit 0: every file was used. 2: a file cannot be used.

@@ -142,7 +142,7 @@ class Player:
         try:
             for k, moment in enumerate(np.linspace(t[0], t[-1], count)):
                 self.show(self._nearest(float(moment)))
-                frames.append(client.get_render(height=_SIZE[1], width=_SIZE[0], timeout=60.0))
+                frames.append(_new_picture(client, frames[-1] if frames else None))
                 note.body = f"{k + 1} of {count} pictures"
         except (
             RuntimeError,
@@ -154,6 +154,18 @@ class Player:
             self.show(kept)
         name = f"{self._viewer.file_name}.gif"
         client.send_file_download(name, as_gif(frames, seconds / (count - 1)), save_immediately=True)
+
+
+def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
+    """Return the browser's picture of the robot.
+
+    A busy browser may draw the previous pose again. If the picture equals the last one, ask up to five times.
+    """
+    for _ in range(5):
+        picture: np.ndarray = client.get_render(height=_SIZE[1], width=_SIZE[0], timeout=60.0)
+        if last is None or not np.array_equal(picture, last):
+            break
+    return picture
 
 
 def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
