@@ -26,6 +26,7 @@ from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, FramePair, Gauge, Screw, along, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, Grid, point, upper_bounds
 from urdfkin.model.tree import FloatArray
+from urdfkin.report.same import where
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 
@@ -258,19 +259,34 @@ def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> Non
     assert tightened(search, frame, 1.05 * lower, upper, most=0) == upper
 
 
-def test_a_joint_that_mimics_in_one_model_only_is_not_bounded_as_if_one_variable_moved_both() -> None:
-    def arm(place: str, inside: str) -> Robot:
-        first = joint("j1", "revolute", "base", "upper", f'xyz="{place} 0 0"', more=limit())
-        second = joint("j2", "revolute", "upper", "fore", more=limit() + inside)
-        return loaded(urdf(first, second, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis="")))
+def two_turns(place: str, inside: str) -> Robot:
+    """An arm with two joints about z; the text `inside` stands in the second joint."""
+    first = joint("j1", "revolute", "base", "upper", f'xyz="{place} 0 0"', more=limit())
+    second = joint("j2", "revolute", "upper", "fore", more=limit() + inside)
+    return loaded(urdf(first, second, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis="")))
 
-    a, b = arm("0", mimic("j1")), arm("-5", "")
+
+def test_a_joint_that_mimics_in_one_model_only_is_not_bounded_as_if_one_variable_moved_both() -> None:
+    a, b = two_turns("0", mimic("j1")), two_turns("-5", "")
     search, frame = laid(a, b, "tool", AS_WRITTEN)
     q = a.sample(500, seed=0)
     apart = b.placement(np.hstack([q, np.ones_like(q)]), "tool") - a.placement(q, "tool")
     attained = float(np.linalg.norm(apart[:, :3, 3], axis=1).max())
     assert attained > 5.5
     assert tightened(search, frame, 5.3, 7.0) >= attained
+
+
+def test_the_worst_configuration_names_a_joint_that_moves_on_its_own_in_b_only() -> None:
+    a, b = two_turns("0", mimic("j1")), two_turns("0", "")
+    found = urdfkin.same(a, b)
+    assert found.worst is not None
+    q = {"j1": found.worst.q_a[0], "j2": found.worst.q_b[1]}
+    apart = b.placement(q, "tool")[:3, 3] - a.placement({"j1": q["j1"]}, "tool")[:3, 3]
+    assert np.linalg.norm(apart) == pytest.approx(found.worst.lower)
+    assert where(found, found.worst) == f"j1 {q['j1']:.6g} rad, j2 of B {q['j2']:.6g} rad"
+    turned = urdfkin.same(b, a)
+    assert turned.worst is not None
+    assert "of B" not in where(turned, turned.worst)
 
 
 @pytest.mark.slow

@@ -157,10 +157,18 @@ def as_written(found: Sameness) -> str:
 
 
 def where(found: Sameness, frame: Interval) -> str:
-    """Return the configuration at which a lower bound is attained, in A's coordinates with their units."""
+    """Return the configuration at which a lower bound is attained, with units.
+
+    The text has the coordinates of A. If a joint moves on its own only in B, the text has its coordinate too.
+    """
     from urdfkin.model.configuration import coordinate_names, units  # noqa: PLC0415
 
-    names = zip(coordinate_names(found.trees[0]), units(found.trees[0], "q"), frame.q_a, strict=False)
+    a, b = found.trees
+    names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
+    driven = {one.b for one in found.joints if (own := a.joints[a.joint_index(one.a)]).nv and not own.mimic}
+    alone = {b.q_index[i] for i, joint in enumerate(b.joints) if joint.nv == 1 and joint.name not in driven}
+    of_b = zip(coordinate_names(b), units(b, "q"), frame.q_b, strict=False)
+    names += [(f"{name} of B", unit, value) for k, (name, unit, value) in enumerate(of_b) if k in alone]
     some = [f"{name} {value:.6g} {unit}".rstrip() for name, unit, value in names if value]
     return ", ".join(some) or "the zero configuration"
 
