@@ -40,6 +40,32 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def documented() -> Iterator[tuple[str, object]]:
+    """Each name of the reference, and each public member of its classes that urdfkin defines."""
+    for _, _, names in LIBRARY.values():
+        for name in names.split():
+            found = pydoc.locate(address(name))
+            yield name, found
+            if inspect.isclass(found):
+                yield from (
+                    (f"{name}.{member}", value)
+                    for member, value in vars(found).items()
+                    if not member.startswith("_")
+                    and (
+                        inspect.isfunction(value) or isinstance(value, property | classmethod | staticmethod)
+                    )
+                )
+
+
+def test_every_name_of_the_reference_has_a_docstring() -> None:
+    names = dict(documented())
+    assert {"Robot.jacobian", "jacobian", "DHTable.rows_near", "same"} & set(names) >= {
+        "Robot.jacobian",
+        "same",
+    }
+    assert [name for name, found in names.items() if not inspect.getdoc(found)] == []
+
+
 @pytest.mark.long
 def test_every_page_is_built_and_in_the_menu(site: Path) -> None:
     built = {str(path.relative_to(site)) for path in site.rglob("*.html")} - {"404.html"}
