@@ -1,4 +1,4 @@
-"""Read the certificate of verified results, and make the check cheaper.
+"""Check results against Pinocchio, read the certificate, and check only a part of a large batch.
 
 You learn how to check a single call with `verify`, and how `certificate()` lists all checked calls.
 """
