@@ -849,16 +849,22 @@ class _Maker:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
-        """Return the range of each coordinate, computed from the limits of all joints that it moves.
+        """Return the range of each coordinate, computed from the limits of the independent joints it moves.
 
         If a coordinate moves a joint of A and a joint of B, its range is the intersection of their limits. If
         A's limits and B's limits do not intersect, the range consists of A's limits. The limits of a mimic
-        joint are used only for a coordinate that has no limits of its own, because a mimic joint follows its
-        rule even beyond its limits.
+        joint do not count, because a mimic joint follows its rule even beyond its limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}
-        mimic: dict[str, tuple[float, float]] = {}
+        mimic = set[str]()
+
+        def restrict(k: int, name: str, ends: tuple[float, float]) -> None:
+            low, high = own.get(name, (-math.inf, math.inf))
+            own[name] = max(low, ends[0]), min(high, ends[1])
+            if k == 0 or name not in first:
+                first[name] = ends
+
         for step, pair in zip(self.found.steps, pairs, strict=True):
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
@@ -868,20 +874,18 @@ class _Maker:
                     continue
                 if not (line := (pair.a, pair.written)[k]).slope:
                     continue
-                ends = sorted((end - line.constant) / line.slope for end in limits(joint))
-                held = own if joint.mimic is None else mimic
-                low, high = held.get(line.variable, (-math.inf, math.inf))
-                held[line.variable] = max(low, ends[0]), min(high, ends[1])
-                if joint.mimic is None and (k == 0 or line.variable not in first):
-                    first[line.variable] = ends[0], ends[1]
-        ranges = dict[str, tuple[float, float]]()
-        for name in own | mimic:
-            found, other = own.get(name, (-math.inf, math.inf)), mimic.get(name, (-math.inf, math.inf))
-            if not found[0] < found[1]:
-                found = first.get(name, found)
-            without = math.isinf(found[0]) and math.isinf(found[1]) and other[0] < other[1]
-            ranges[name] = other if without else found
-        return ranges
+                if joint.mimic is None:
+                    low, high = sorted((end - line.constant) / line.slope for end in limits(joint))
+                    restrict(k, line.variable, (low, high))
+                else:
+                    mimic.add(line.variable)
+        # A joint that only one model has can be mimicked by a joint that both models have.
+        for k, unpaired in enumerate((self.found.only_a, self.found.only_b)):
+            for joint in (self.trees[k].joints[j] for j in unpaired):
+                if joint.nq == 1 and (name := f"{'ab'[k]}:{joint.name}") in mimic:
+                    restrict(k, name, limits(joint))
+        ranges = {name: own.get(name, (-math.inf, math.inf)) for name in [*own, *sorted(mimic - set(own))]}
+        return {name: ends if ends[0] < ends[1] else first[name] for name, ends in ranges.items()}
 
 
 def limits(joint: Joint) -> tuple[float, float]:

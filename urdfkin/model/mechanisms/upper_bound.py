@@ -192,8 +192,10 @@ class Support:
         Therefore, |u| is at least cos r times the sum of c_k |g_k|, and h(u) / |u| is at most 1 / cos r times
         the largest h(g_k) / |g_k|.
         """
-        share = (self.values / self.grid.lengths).max(initial=0.0)
-        return float(share) / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
+        share = float((self.values / self.grid.lengths).max(initial=0.0))
+        if math.isnan(share):  # Zero times infinity proves nothing.
+            return math.inf
+        return share / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
 
     def __add__(self, other: Support) -> Support:
         return Support(self.grid, self.values + other.values)
@@ -301,7 +303,12 @@ def _metres(
 def _off(L: FloatArray, reach: float) -> float:
     """Return a bound (m) on the distance |(R - 1) y + p| by which L moves a point y, |y| <= `reach`."""
     turned, moved = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
-    return moved + turned * reach if turned else moved
+    return moved + _times(turned, reach)
+
+
+def _times(factor: float, reach: float) -> float:
+    """Return factor * reach, which is 0 if the factor is 0 and the reach is infinite."""
+    return factor * reach if factor else 0.0
 
 
 def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
@@ -411,10 +418,10 @@ def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Sup
         reach = Support(y.grid, y.values - G @ other.point).largest() if tilt else 0.0
         off = float(np.linalg.norm(np.cross(other.point - axis.point, axis.direction)))
         late = abs(pair.b.constant - pair.a.constant)
-        bend = (2.0 * tilt + min(late, 2.0)) * widest + tilt * reach + off
+        bend = _times(2.0 * tilt + min(late, 2.0), widest) + tilt * reach + off
         bend *= pair.a.slope**2
     else:
-        bend = pair.a.slope**2 * y.radius(axis) + pair.b.slope**2 * widest
+        bend = _times(pair.a.slope**2, y.radius(axis)) + _times(pair.b.slope**2, widest)
     between = np.maximum(apart_[:-1], apart_[1:]) + bend * (z[1] - z[0]) ** 2 / 8.0 * y.grid.lengths
     if d.values.any():
         half = abs(pair.a.slope) * (z[1] - z[0]) / 2.0
@@ -436,6 +443,6 @@ def _independent_difference(step: Step, pair: Pair, variables: Variables, y: Sup
         there = y.turned(step.other, *variables.range(pair.b))
         back = Support(y.grid, y.values).turned(step.axis, *variables.range(pair.a))
         return Support(y.grid, there.values + back.at(-G))
-    chord = 2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0) * y.radius(step.axis)
-    across = G - (G @ u)[:, None] * u
-    return Support(y.grid, chord * np.linalg.norm(across, axis=1))
+    chord = _times(2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0), y.radius(step.axis))
+    across = np.linalg.norm(G - (G @ u)[:, None] * u, axis=1)
+    return Support(y.grid, np.array([_times(length, chord) for length in across]))
