@@ -89,10 +89,18 @@ class Search:
         found: The alignment of the robots.
         variables: The variables that move A and B.
         seed: Seed of the random configurations.
+        as_written: Whether B's root stays at its pose, even if the matching begins at another link of B.
+            Otherwise, B is moved so that the link where the matching begins keeps its pose.
     """
 
     def __init__(
-        self, robots: tuple[Robot, Robot], found: Alignment, variables: Variables, seed: int = 0
+        self,
+        robots: tuple[Robot, Robot],
+        found: Alignment,
+        variables: Variables,
+        seed: int = 0,
+        *,
+        as_written: bool = False,
     ) -> None:
         self.robots, self.found, self.variables = robots, found, variables
         self.names = list(variables.ranges)
@@ -104,6 +112,9 @@ class Search:
         self.stands = tuple(
             m.body_of[link] == 0 for m, link in zip((found.a, found.b), found.base, strict=True)
         )
+        #: Whether the distances depend on the motion between B's root and the link where the matching begins.
+        #: `upper_bounds` and `tightened` do not bound this motion.
+        self.unbounded = as_written and not all(self.stands)
 
     def _ends(self, name: str) -> tuple[float, float]:
         low, high = self.variables.ranges[name]
@@ -151,9 +162,11 @@ class Search:
             z[0, k] = q[0, tree.q_index[tree.joint_index(name[2:])]]
         low, high = self.ends.T
         room = EPS * FOLLOWER * (1.0 + np.maximum(np.abs(low), np.abs(high)))
-        mapped = self.configurations(z)[1]
-        off = np.abs(mapped - q_b) <= EPS * FOLLOWER * (1.0 + np.abs(mapped))
-        return bool(off.all() and (low - room <= z).all() and (z <= high + room).all())
+        alike = all(
+            (np.abs(mapped - q) <= EPS * FOLLOWER * (1.0 + np.abs(mapped))).all()
+            for mapped, q in zip(self.configurations(z), (q_a, q_b), strict=True)
+        )
+        return alike and bool((low - room <= z).all() and (z <= high + room).all())
 
     def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
         """Return poses (n, frames, 4, 4) of A and of B in A's root frame, at values (n, variables)."""
@@ -171,6 +184,8 @@ class Search:
         base = b.tree.link_frames[self.found.base[1]]
         Ts_b = computed(b, q_b, [base, *(b.tree.link_frames[frame.b] for frame in frames)])
         tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
+        if self.unbounded:
+            return Ts_a, self.found.X @ Ts_b[:, 1:] @ tools
         hold = self.hold
         if not self.stands[0]:
             link = self.found.base[0]
@@ -316,11 +331,15 @@ def curvature(
     names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
     found = np.zeros((len(names), len(names)))
     for i, j, most in _second_derivatives(steps, pairs, variables, frame):
+        both = pairs[i], pairs[j]
+        if not all(one.a.slope or one.b.slope for one in both):
+            continue
+        alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
+        # For a prismatic joint i, `most` contains no difference between the values of the two joints.
+        if not all(alike) and (most or (steps[i].kind != "turns" and not alike[0])):
+            return names, np.full_like(found, math.inf)
         if not most:
             continue
-        both = pairs[i], pairs[j]
-        if not all(one.variable and one.a.slope and one.a.slope == one.b.slope for one in both):
-            return names, np.full_like(found, math.inf)
         bend = most * abs(pairs[i].a.slope * pairs[j].a.slope)
         at, to = (names.index(pairs[k].a.variable) for k in (i, j))
         found[at, to] += bend

@@ -46,7 +46,7 @@ from urdfkin.model.mechanisms.mechanism import (
     variables_of,
 )
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.tree import FloatArray, KinematicTree, Lock, inverse
+from urdfkin.model.tree import FloatArray, Joint, KinematicTree, Lock, inverse
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 from urdfkin.urdf.sources import Source, is_usd
@@ -190,7 +190,7 @@ class Comparator:
 
     def judged(self) -> Sameness:
         """Return the complete result: verdict, intervals and Pinocchio's confirmation."""
-        found = align(*self.mechanisms, {**self.spelled, **self.given})
+        found = self.alignment()
         self._check_map(found)
         variables = variables_of(found, self.tolerance)
         said = self.said(found, variables)
@@ -207,6 +207,10 @@ class Comparator:
                 most = (math.inf, math.inf)
         checked = self._confirm(found, variables, frames)
         return replace(said, frames=frames, as_written=as_written, written=most, checked=checked)
+
+    def alignment(self) -> Alignment:
+        """Search for the alignment of B with A for which most joints and links agree."""
+        return align(*self.mechanisms, {**self.spelled, **self.given})
 
     def said(self, found: Alignment, variables: Variables) -> Sameness:
         """Return the result that follows from the alignment, without intervals and without confirmation.
@@ -334,9 +338,9 @@ class Comparator:
                     remedy="also map the joints before these joints, or remove this pair",
                 )
 
-    def search(self, found: Alignment, variables: Variables) -> Search:
+    def search(self, found: Alignment, variables: Variables, *, as_written: bool = False) -> Search:
         """Return a search for the largest distances between matching frames."""
-        return Search(self.robots, found, variables)
+        return Search(self.robots, found, variables, as_written=as_written)
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
         """Bound the distance and the angle (m, rad) between two frames that differ only by rounding.
@@ -386,11 +390,14 @@ class Comparator:
 
         The function improves the bound only if the improved bound can prove the distance `within`.
         """
+        search = self.search(written, variables, as_written=True)
+        if search.unbounded:
+            return math.inf, math.inf
         metres, radians = self.rounding(written, variables)
         uppers = self._uppers(written, variables)
         target = 0.0 if self.within is None else self.within - metres
         if farthest is not None and farthest.lower <= target:
-            self._sharpen(uppers, written.frames, self.search(written, variables), target)
+            self._sharpen(uppers, written.frames, search, target)
         most = _largest(uppers)
         return most[0] + metres, most[1] + radians
 
@@ -426,14 +433,14 @@ class Comparator:
         if not found.frames:
             return None
         metres, radians = self.rounding(found, variables)
-        search = self.search(found, variables)
+        search = self.search(found, variables, as_written=True)
         off = search.seen(found.frames)[0].max(axis=0)
         far = [found.frames[k] for k in np.argsort(-off, kind="stable")[:FARTHEST]]
         if off.max() <= metres:  # no position differs: take the frame with the largest angle
             far = [max(found.frames, key=lambda frame: upper_bounds(found, variables, frame)[1])]
         climbed = zip(search.worst(far), far, strict=True)
         seen, frame = max(climbed, key=lambda both: both[0][0])
-        upper = upper_bounds(found, variables, frame, FINE)
+        upper = (math.inf, math.inf) if search.unbounded else upper_bounds(found, variables, frame, FINE)
         return self._interval(found, frame, search, seen, (upper[0] + metres, upper[1] + radians))
 
     def _interval(
@@ -469,7 +476,7 @@ class Comparator:
                 return Confirmation("not verified", reason=reason)
         off = self.pinocchio_distances(found, variables)
         for interval, metres in zip(frames, off, strict=False):
-            if metres > interval.upper * (1.0 + EPS):
+            if not metres <= interval.upper * (1.0 + EPS):
                 raise UrdfkinError(
                     "Pinocchio finds a distance beyond its proven bound",
                     where=f"frame {interval.frame}",
@@ -534,17 +541,21 @@ def _with_idle_joints_fixed(
     joint that moves: then `same` compares the two joints. Joints match by name (`names`), or by the label of
     their child link. The arguments are described in `_fixed_here`.
     """
-    moving = {joint.name for joint in other.joints if joint.kind.nv}
-    children = {labels[1][i + 1] for i, joint in enumerate(other.joints) if joint.kind.nv}
+    moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
+    moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
+    children = {labels[1][i + 1] for i, moved in enumerate(moves) if moved}
     joints = tuple(
         Lock(joint, 0.0).fixed()
-        if joint.mimic is not None
-        and joint.mimic.multiplier == 0.0
+        if _never_moves(joint)
         and not (names.get(joint.name, joint.name) in moving or labels[0][i + 1] in children)
         else joint
         for i, joint in enumerate(tree.joints)
     )
     return tree if joints == tree.joints else replace(tree, joints=joints)
+
+
+def _never_moves(joint: Joint) -> bool:
+    return joint.mimic is not None and joint.mimic.multiplier == 0.0
 
 
 def _spelled_alike(
