@@ -28,7 +28,7 @@ from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
 from urdfkin.model.tree import JointKind, Mimic
 from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, Header, Layout, Matrix, Size, of_length, plain, says
-from urdfkin.verify.oracles import versions
+from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Largest number of boxes in memory while a bound of a certificate is proven again.
 MOST_AGAIN = 2**22
@@ -258,7 +258,8 @@ def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
     The list is empty if the certificate is right.
 
     The certificate states which joints match, and how the coordinates of A are converted to those of B. The
-    recheck uses these statements, so it needs no search. First, the function checks the statements. The
+    recheck uses these statements, so it needs no search. Only the verdict "differs" needs one, because
+    another alignment could make the models agree. First, the function checks the statements. The
     transforms must be rigid motions, and the named joints must exist. If the certificate changes the order of
     joints, the new order must give the same motion. Then the function computes the verdict, the changes and
     the remarks again, and compares them with the certificate. A lower bound is a distance at a configuration
@@ -310,8 +311,15 @@ def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
         else:
             yield from _interval_errors(search, frame, claim, said.rounding, sharply=not wrong)
     yield from (f"frame {names[0]} is not a common frame of the models" for names in claims)
-    if document["as_written"] is not None:
+    if document["verdict"] == Verdict.DIFFERS.value and not wrong:
+        other = comparator.alignment()
+        better = comparator.said(other, variables_of(other, comparator.tolerance)).verdict
+        if better is not Verdict.DIFFERS:
+            yield f"`verdict`: another alignment of B with A gives {better.value}, not differs"
+    if said.after:
         yield from _as_written_errors(document["as_written"], comparator, found, sharply=not wrong)
+    elif document["as_written"] is not None:
+        yield "`as_written`: B needs no changes, so this entry must be null"
     yield from _confirmation_errors(document["checked"], comparator, found, variables)
 
 
@@ -374,7 +382,8 @@ def _confirmation_errors(
     state, reason = claimed["state"], claimed["reason"]
     if state != "confirmed" and reason and claimed == plain(Confirmation(state, reason=reason)):
         return
-    if state != "confirmed" or reason or claimed["configurations"] != CONFIRMED or not claimed["by"]:
+    known = claimed["by"].startswith(f"{PINOCCHIO.title} ")
+    if state != "confirmed" or reason or claimed["configurations"] != CONFIRMED or not known:
         yield (
             f"`checked`: there is neither a confirmation at {CONFIRMED} configurations, nor a reason"
             " for its absence"
@@ -444,10 +453,14 @@ def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
 
 
 def _as_written_errors(
-    claim: FrameEntry, comparator: Comparator, found: Alignment, *, sharply: bool
+    claim: FrameEntry | None, comparator: Comparator, found: Alignment, *, sharply: bool
 ) -> Iterator[str]:
     """Yield wrong statements about the largest distance between the unchanged models."""
     written = comparator.as_written(found)
+    if claim is None:
+        if written.frames:
+            yield "`as_written`: the largest distance without changes of B is missing"
+        return
     variables = variables_of(written, comparator.tolerance)
     names = [
         (comparator.trees[0].links[frame.a], comparator.trees[1].links[frame.b]) for frame in written.frames
@@ -456,7 +469,11 @@ def _as_written_errors(
         yield f"`as_written`: frame {claim['frame']} is not a common frame of the models"
         return
     frame = written.frames[names.index((claim["frame"], claim["frame_b"]))]
-    search, rounding = comparator.search(written, variables), comparator.rounding(written, variables)
+    search = comparator.search(written, variables, as_written=True)
+    rounding = comparator.rounding(written, variables)
+    off = search.seen(written.frames)[0].max(axis=0)
+    if claim["upper"] is not None and off.max() > claim["upper"] + rounding[0]:
+        yield f"`as_written`: frame {names[int(off.argmax())][0]} is {off.max():.6g} m off, which is farther"
     problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
     yield from (f"`as_written`: {line}" for line in problems)
 
@@ -485,10 +502,15 @@ def _interval_errors(
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _not_attained(search, frame, claim, rounding)
     yield from problems
-    metres = (math.inf if claim["upper"] is None else claim["upper"]) - rounding[0]
-    radians = (math.inf if claim["radians"] is None else claim["radians"]) - rounding[1]
+    most = math.inf if claim["upper"] is None else claim["upper"]
+    widest = math.inf if claim["radians"] is None else claim["radians"]
+    if claim["lower"] > most or claim["radians_seen"] > widest:
+        yield f"frame {claim['frame']}: a lower bound is larger than the upper bound"
+    metres, radians = most - rounding[0], widest - rounding[1]
     for grid in (COARSE, FINE):
-        proven = upper_bounds(search.found, search.variables, frame, grid)
+        proven = math.inf, math.inf
+        if not search.unbounded:
+            proven = upper_bounds(search.found, search.variables, frame, grid)
         if holds := _within(proven[0], metres, rounding[0]) and _within(proven[1], radians, rounding[1]):
             break
     if holds:
@@ -502,7 +524,8 @@ def _interval_errors(
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
             return
-        proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
+        if not search.unbounded:
+            proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
         if _within(proven[0], metres, rounding[0]):
             return
     yield f"{place}: its upper bound is not proven; {proven[0]:.6g} m and {proven[1]:.6g} rad are proven"

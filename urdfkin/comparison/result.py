@@ -147,7 +147,7 @@ class Difference:
         return a, b
 
     @property
-    def words(self) -> str:  # noqa: PLR0911  a line for each parameter
+    def words(self) -> str:  # noqa: PLR0911, PLR0912  a line for each parameter
         """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
         off = [f"{length(self.metres)} off"] if self.metres else []
@@ -170,6 +170,8 @@ class Difference:
                 return f"{place} is a mimic joint in A and an independent joint in B: {_rule(a)}"
             case "mimic rule":
                 return f"{place} has another mimic rule: {_rule(a)} in A, {_rule(b)} in B"
+            case "independent joint":
+                return f"{place} is a mimic joint only in A, and moves alike in A and B: {_rule(a)}"
             case "idle":
                 which, values = ("A", a) if isinstance(a, tuple) else ("B", b)
                 return f"{place} never moves in {which}: {_idle_words(values)}"
@@ -874,6 +876,12 @@ def remarks(
         for lock in filter(None, map(idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
             some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
+    # The values of all joints agree, but the coordinate of B is the value of A's mimic joint.
+    for step in found.steps:
+        a, b = found.a.tree.joints[step.a], found.b.tree.joints[step.b]
+        line = variables.leaders.get(b.name)
+        if a.mimic is not None and line is not None and line.variable == f"a:{a.mimic.leader}":
+            some.append(Difference(f"joint {a.name}", "independent joint", a.mimic))
     for tree, other, which in ((found.a.tree, found.b.tree, "A"), (found.b.tree, found.a.tree, "B")):
         paired = {tree.links[frame.a if which == "A" else frame.b] for frame in found.frames}
         lacking = [link for link in tree.links if link not in other.links and link not in paired]

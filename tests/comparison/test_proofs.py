@@ -1,0 +1,309 @@
+"""No proof of `same` covers more than it states: brute force over random pairs, and forged certificates."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urdfkin
+from tests.urdfs import joint, limit, loaded, mimic
+from tests.urdfs import robot as urdf
+from urdfkin.comparison.bounds import tightened
+from urdfkin.comparison.certificate import certificate, recheck
+from urdfkin.comparison.result import Sameness, Verdict
+from urdfkin.comparison.verdict import Comparator
+from urdfkin.model.mechanisms.matcher import align
+from urdfkin.model.mechanisms.mechanism import variables_of
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
+
+AXES = ("0 0 1", "0 1 0", "1 0 0", "0.6 0 0.8", "0 -0.6 0.8")
+
+
+def arm(kinds: list[str], numbers: FloatArray, rules: dict[int, tuple[int, float]]) -> str:
+    """A chain of joints; `rules` has the mimicked joint and the multiplier of each mimic joint."""
+    parts = []
+    for i, (kind, row) in enumerate(zip(kinds, numbers, strict=True)):
+        inside = limit(round(-0.3 - row[6], 3), round(0.4 + row[7], 3)) * (kind in ("revolute", "prismatic"))
+        inside += mimic(f"j{rules[i][0]}", rules[i][1], row[8]) if i in rules else ""
+        origin = 'xyz="{} {} {}" rpy="{} {} {}"'.format(*row[:6])
+        parts.append(joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", origin, AXES[int(row[9]) % 5], inside))
+    return urdf(*parts)
+
+
+def random_pair(seed: int) -> tuple[Robot, Robot]:
+    """Two arms that differ in numbers, limits, kinds and mimic rules."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 6))
+    kinds = [str(kind) for kind in rng.choice(["revolute"] * 4 + ["prismatic"] * 2 + ["continuous"], n)]
+    numbers = np.round(rng.random((n, 10)), 3)
+    numbers[:, 8] *= rng.random() < 0.3
+    numbers[:, 9] = rng.integers(0, 5, n)
+    rules = {
+        i: (int(rng.integers(i)), float(rng.choice([1, -1, 2, 0.5])))
+        for i in range(1, n)
+        if rng.random() < 0.4
+    }
+    others, other, free = list(kinds), numbers.copy(), dict(rules)
+    for _ in range(int(rng.integers(1, 3))):
+        i = int(rng.integers(n))
+        match int(rng.integers(5)):
+            case 0:
+                other[i, :6] += rng.choice([1e-6, 1e-3, 0.1]) * rng.normal(size=6)
+            case 1:
+                other[i, 6:8] *= 0.5
+            case 2:
+                free.pop(i, None)
+            case 3 if i:
+                free[i] = int(rng.integers(i)), float(rng.choice([1.1, -1, 2]))
+            case 4:
+                others[i] = "continuous" if kinds[i] == "revolute" else kinds[i]
+    return loaded(arm(kinds, numbers, rules), verify=False), loaded(arm(others, other, free), verify=False)
+
+
+def largest_distance(a: Robot, b: Robot, links: list[str]) -> tuple[float, float]:
+    """The largest distance and angle of links at samples of all independent joints of A and of B, by name."""
+    rng = np.random.default_rng(0)
+    ends: dict[str, tuple[float, float]] = {}
+    for robot in (a, b):
+        for name, low, high in zip(robot.coordinate_names, *robot.limits, strict=True):
+            known = ends.get(name, (-math.inf, math.inf))
+            ends[name] = max(low, known[0]), min(high, known[1])
+    for name, low, high in zip(a.coordinate_names, *a.limits, strict=True):
+        if not ends[name][0] < ends[name][1]:
+            ends[name] = low, high
+    values = {}
+    for name, pair in ends.items():
+        low, high = np.clip(pair, -math.pi, math.pi)
+        inside = rng.uniform(low, high, 1000)
+        values[name] = np.where(rng.random(1000) < 0.3, rng.choice([low, high], 1000), inside)
+    Ts = [
+        robot.placement(np.stack([values[name] for name in robot.coordinate_names], axis=-1), links)
+        for robot in (a, b)
+    ]
+    turns = np.swapaxes(Ts[0][..., :3, :3], -1, -2) @ Ts[1][..., :3, :3]
+    cosines = np.clip((np.trace(turns, axis1=-2, axis2=-1) - 1.0) / 2.0, -1.0, 1.0)
+    off = np.linalg.norm(Ts[0][..., :3, 3] - Ts[1][..., :3, 3], axis=-1)
+    return float(off.max()), float(np.arccos(cosines).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "seed", [*range(100), *(pytest.param(k, marks=pytest.mark.long) for k in range(100, 1500))]
+)
+def test_no_sample_of_two_random_arms_is_beyond_a_proven_bound(seed: int) -> None:
+    a, b = random_pair(seed)
+    found = urdfkin.same(a, b, boxes=2**10)
+    off, turned = largest_distance(a, b, [f"l{i}" for i in range(len(a.tree.links))])
+    names = set(a.coordinate_names), set(b.coordinate_names)
+    if (
+        names[0] <= names[1] or names[1] <= names[0]
+    ):  # otherwise, rules connect coordinates with different names
+        assert off <= found.written[0] + 1e-9
+        assert turned <= found.written[1] + 3e-7
+    assert found.verdict is not Verdict.SAME or off < 1e-9
+    assert all(frame.lower <= frame.upper + 1e-12 for frame in found.frames)
+    assert found.verdict is Verdict.DIFFERS or recheck(certificate(found), a, b) == []
+
+
+def hinge(more: str, kind: str = "revolute") -> str:
+    return joint("hinge", kind, "base", "door", more=more)
+
+
+def test_a_joint_without_limits_behind_a_difference_leaves_no_bound() -> None:
+    behind = (
+        joint("free", "floating", "door", "body", axis=""),
+        joint("mount", "fixed", "body", "tool", axis=""),
+    )
+    a = loaded(urdf(hinge(limit(-0.5, 0.5)), *behind))
+    b = loaded(urdf(joint("hinge", "fixed", "base", "door"), *behind))
+    found = urdfkin.same(a, b)
+    assert [one.upper for one in found.frames if one.frame == "tool"] == [math.inf]
+    assert not found.within(1.0)
+    far = np.array([0.5, 100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    off = a.placement(far, "tool") - b.placement(far[1:], "tool")
+    assert np.linalg.norm(off[:3, 3]) > 40.0, "the distance indeed exceeds 1 m"
+
+
+def test_a_robot_with_another_root_link_is_not_within_a_distance_that_its_root_exceeds() -> None:
+    a = loaded(urdf(joint("slide", "prismatic", "base", "tip", axis="1 0 0", more=limit(-2, 2))))
+    b = loaded(urdf(joint("slide", "prismatic", "tip", "base", axis="-1 0 0", more=limit(-2, 2))))
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.SAME_AFTER
+    assert not found.within(1e-6)
+    off = a.placement([1.5], "tip") - b.placement([1.5], "tip")
+    assert np.linalg.norm(off[:3, 3]) == 1.5
+    assert found.as_written is not None
+    assert found.as_written.lower == pytest.approx(2.0)
+    assert found.as_written.upper == math.inf
+    document = certificate(found)
+    assert recheck(document, a, b) == []
+    assert document["as_written"] is not None
+    document["as_written"]["upper"] = 2.1
+    assert any("not proven" in line for line in recheck(document, a, b))
+
+
+def test_the_slopes_of_two_slides_count_in_the_bound_of_a_box() -> None:
+    arm = joint("turn", "revolute", "base", "arm", 'xyz="0 {} 0"', more=limit())
+    rest = joint("slide", "prismatic", "arm", "tool", axis="1 0 0", more=limit(-9, 9) + "{}")
+    lever = joint("lever", "revolute", "base", "handle", 'xyz="0 0 9"', more=limit())
+    a, b = (
+        loaded(urdf(arm.format(y), rest.format(mimic("lever", m)), lever)) for y, m in ((0, 1.0), (-5, 2.0))
+    )
+    comparator = Comparator((a, b), {}, bounds=True)
+    written = comparator.as_written(comparator.alignment())
+    search = comparator.search(written, variables_of(written, comparator.tolerance), as_written=True)
+    (frame,) = (one for one in written.frames if a.tree.links[one.a] == "tool")
+    q = a.sample(1000, seed=0)
+    off = np.linalg.norm((b.placement(q, "tool") - a.placement(q, "tool"))[:, :3, 3], axis=1).max()
+    assert off > 5.7
+    assert tightened(search, frame, 5.2, 7.0) >= off
+
+
+def test_the_limits_of_a_mimic_joint_do_not_restrict_the_joint_that_it_mimics() -> None:
+    turn = joint("turn", "continuous", "base", "wheel")
+    mount = joint("mount", "fixed", "door", "tool", 'xyz="1 0 0"', axis="")
+    a, b = (loaded(urdf(turn, hinge(limit(-0.1, 0.1) + mimic("turn", m)), mount)) for m in (1.0, 1.1))
+    found = urdfkin.same(a, b)
+    off = np.linalg.norm((a.placement([3.0], "tool") - b.placement([3.0], "tool"))[:3, 3])
+    assert off > 0.29
+    assert found.written[0] >= off
+    assert not found.within(0.02)
+
+
+def test_the_limits_of_a_mimicked_joint_that_only_one_model_has_count() -> None:
+    mount = joint("mount", "fixed", "door", "tool", 'xyz="1 0 0"', axis="")
+    lever = joint("lever", "revolute", "base", "handle", 'xyz="0 5 0"', "0 1 0", limit(-3, 3))
+    a = loaded(urdf(hinge(limit(-0.1, 0.1)), mount))
+    b = loaded(urdf(hinge(limit(-0.1, 0.1) + mimic("lever")), mount, lever))
+    (tool,) = (frame for frame in urdfkin.same(a, b).frames if frame.frame == "tool")
+    off = np.linalg.norm((a.placement([0.1], "tool") - b.placement([-3.0], "tool"))[:3, 3])
+    assert off > 1.99
+    assert tool.upper >= off
+
+
+def test_equal_robots_with_another_independent_joint_have_a_remark() -> None:
+    fore = 'xyz="1 0 0"'
+    a = loaded(
+        urdf(
+            hinge(limit()),
+            joint("wrist", "revolute", "door", "hand", fore, "0 1 0", limit(-2, 2) + mimic("hinge", 2)),
+        )
+    )
+    b = loaded(
+        urdf(
+            hinge(limit() + mimic("wrist", 0.5)),
+            joint("wrist", "revolute", "door", "hand", fore, "0 1 0", limit(-2, 2)),
+        )
+    )
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.SAME
+    assert [one.words for one in found.remarks] == [
+        "joint wrist is a mimic joint only in A, and moves alike in A and B: 2.0 hinge +0"
+    ]
+    assert found.exit_code(strict=True) == 1
+    assert found.to_b([0.7]).tolist() == [1.4]
+
+
+def test_the_axes_of_joints_that_never_move_do_not_count() -> None:
+    a, b = (
+        loaded(
+            urdf(
+                hinge(limit()),
+                joint("idle", "revolute", "door", "hand", axis=axis, more=limit() + mimic("hinge", 0)),
+            )
+        )
+        for axis in ("0 0 1", "0 1 0")
+    )
+    assert urdfkin.same(a, b).verdict is Verdict.SAME
+
+
+@pytest.fixture(scope="module")
+def one_millimetre() -> tuple[Robot, Robot, Sameness]:
+    """A floating arm, and the same arm with a link that is 1 mm longer."""
+    a, b = (
+        loaded(
+            urdf(
+                joint("free", "floating", "world", "base", axis=""),
+                hinge(limit()),
+                joint("mount", "fixed", "door", "tool", f'xyz="{length} 0 0"', axis=""),
+                joint("grip", "fixed", "tool", "grip", axis=""),
+            )
+        )
+        for length in (1.0, 1.001)
+    )
+    return a, b, urdfkin.same(a, b)
+
+
+@pytest.fixture(scope="module")
+def reversed_axis() -> tuple[Robot, Robot, Sameness]:
+    """An arm, and the same arm with one axis reversed."""
+    a, b = (
+        loaded(
+            urdf(
+                hinge(limit()),
+                joint("lift", "revolute", "door", "fore", 'xyz="1 0 0"', axis, limit()),
+                joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis=""),
+            )
+        )
+        for axis in ("0 1 0", "0 -1 0")
+    )
+    return a, b, urdfkin.same(a, b)
+
+
+def forge_lower(document: Any) -> None:
+    (tool,) = (one for one in document["frames"] if one["frame"] == "tool")
+    tool["q_a"][0], tool["lower"], tool["upper"] = 5.0, 4.9, None
+
+
+def forge_order(document: Any) -> None:
+    (tool,) = (one for one in document["frames"] if one["frame"] == "tool")
+    tool["upper"] = 0.5 * tool["lower"]
+
+
+def forge_frame(document: Any) -> None:
+    document["as_written"].update(
+        frame="door", frame_b="door", lower=0.0, upper=1e-9, radians=1e-9, radians_seen=0.0, q_a=[], q_b=[]
+    )
+
+
+FORGED: dict[str, tuple[str, Callable[[Any], None], str]] = {
+    "another pose of a floating joint": ("one_millimetre", forge_lower, "do not correspond"),
+    "a lower bound above the upper bound": ("one_millimetre", forge_order, "larger than the upper bound"),
+    "another engine": ("one_millimetre", lambda d: d["checked"].update(by="NASA 1.0"), "`checked`"),
+    "a nearer frame": ("reversed_axis", forge_frame, "which is farther"),
+    "no distance as written": ("reversed_axis", lambda d: d.update(as_written=None), "is missing"),
+}
+
+
+@pytest.mark.parametrize("forged", FORGED)
+def test_a_recheck_rejects_a_certificate_with(forged: str, request: pytest.FixtureRequest) -> None:
+    pair, forge, words = FORGED[forged]
+    a, b, found = request.getfixturevalue(pair)
+    document = json.loads(json.dumps(certificate(found)))
+    assert recheck(document, a, b) == []
+    forge(document)
+    assert any(words in line for line in recheck(document, a, b))
+
+
+def test_a_recheck_rejects_the_verdict_differs_if_another_alignment_agrees(
+    reversed_axis: tuple[Robot, Robot, Sameness], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a = reversed_axis[0]
+    comparator = Comparator((a, copy.copy(a)), {}, bounds=True)
+    gauge = align(*comparator.mechanisms, {}).gauge
+    moved = gauge.X.copy()
+    moved[2, 3] = 0.5
+    raised = align(*comparator.mechanisms, {}, replace(gauge, X=moved))
+    with monkeypatch.context() as patched:
+        patched.setattr(Comparator, "alignment", lambda _: raised)
+        found = urdfkin.same(a, copy.copy(a))
+    assert found.verdict is Verdict.DIFFERS, "B is held half a metre too high"
+    assert any("another alignment" in line for line in recheck(certificate(found), a, copy.copy(a)))
