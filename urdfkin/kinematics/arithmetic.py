@@ -23,9 +23,7 @@ def bound(
 ) -> SimpleNamespace:
     """Return a namespace with a copy of each function of `equations`; the copies use other basic operations.
 
-    Args:
-        made: A decorator that is applied to each copied function, for example the decorator of a compiler.
-        vectors: Basic operations, by name, that replace the basic operations of `equations`.
+    Each copy passes through the decorator `made`. `vectors` are the basic operations by name.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -39,12 +37,9 @@ def rebound(
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    A copy calls other copies instead of the original functions.
-
-    Args:
-        modules: The modules. A module may use functions of the modules that are listed before it.
-        made: A decorator that is applied to each copied function, for example the decorator of a compiler.
-        others: Replacements, by name, for functions and modules that a module imports or defines.
+    A copy calls other copies instead of the original functions, and those of `others` instead of functions or
+    modules of the same name. Each copy passes through the decorator `made`, for example that of a compiler. A
+    module may use functions of the modules that are listed before it.
     """
     copies: dict[str, Any] = {}
     for module in modules:

@@ -105,10 +105,7 @@ _words = bound(
 
 
 def latex(name: str) -> str:
-    r"""Return the LaTeX text of an equation of the textbook.
-
-    Args:
-        name: Name of a function of `urdfkin.kinematics.equations`.
+    r"""Return the LaTeX text of a function of `urdfkin.kinematics.equations`.
 
     >>> print(latex("point_acceleration"))
     \ddot{d} + \dot{\omega} \times d + \omega \times (\omega \times d)

@@ -14,7 +14,7 @@ State = TypeVar("State")
 Seen = TypeVar("Seen")
 
 _ROUNDS = 100
-#: Damping of a Gauss-Newton step, divided by the largest singular value: first, smallest and largest value.
+#: Damping of a Gauss-Newton step, relative to the largest singular value: first, smallest, largest value.
 _DAMPING, _LEAST, _MOST = 1e-3, 1e-14, 1e3
 #: Two factors for the damping: one for a step that reduces the error, and one for a step that does not.
 _EASING, _HARDER = 0.03, 10.0
@@ -39,9 +39,8 @@ def least_squares(
 
     Args:
         start: The state from which the iteration starts.
-        residuals: Returns the residuals (rows,) of a state, and intermediate results that `derivatives` uses.
-        derivatives: Returns the negative derivatives (rows, parameters) of a state's residuals with respect
-            to the parameters.
+        residuals: Returns the residuals (rows,) of a state, and intermediate results for `derivatives`.
+        derivatives: Returns the negative derivatives (rows, parameters) of the residuals.
         moved: Returns the new state after a step (parameters,) from a state.
         longest: Largest component of a step.
         patience: The iteration ends after this many slow steps; 0 means no limit.

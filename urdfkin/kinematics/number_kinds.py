@@ -74,8 +74,8 @@ def norm(x: FloatArray) -> FloatArray:
     return counted(np.hypot.reduce(x, axis=-1))
 
 
-#: The equations with lengths: a vector is replaced by its length, and a number by its absolute value. Each
-#: length is a Python number or an array; arrays broadcast. A unit vector has length 1.
+#: The equations with lengths: a vector is replaced by its length, and a number by its absolute value.
+#: Each length is a Python number or an array; arrays broadcast. A unit vector has length 1.
 length_equations = bound(
     plus=add,
     minus=add,

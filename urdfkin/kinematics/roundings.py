@@ -188,19 +188,17 @@ LEAST_UNIT = EPS * SMALLEST
 #: Least divisor: `max(x, NOT_ZERO)` avoids a division by 0. Every measured number is larger.
 NOT_ZERO = 1e-300
 
-#: Allowed difference (in eps) between urdfkin and Pinocchio, for each joint and each factor of a term such as
-#: w x (w x d). The module docstring derives it.
+#: Allowed difference (in eps) between urdfkin and Pinocchio; the module docstring derives it.
+#: It applies to each joint and to each factor of a term such as w x (w x d).
 ROUNDINGS = 24.0
-#: Allowed difference (in eps) between urdfkin and MuJoCo, for each joint and each factor of a term such as w
-#: x (w x d). The module docstring derives it.
+#: Allowed difference (in eps) between urdfkin and MuJoCo; otherwise as `ROUNDINGS`.
 MUJOCO = 30.0
-#: Allowed error (in eps) of a mimic rule of an MJCF file, between urdfkin's tree and MuJoCo (derivation
-#: above).
+#: Allowed error (in eps) of a mimic rule of an MJCF file, between urdfkin's tree and MuJoCo (derived above).
 MJCF_RULE = 8.0
-#: Allowed error (in eps) for each row of a Denavit-Hartenberg table (derivation above).
+#: Allowed error (in eps) for each row of a Denavit-Hartenberg table (derived above).
 ROW = 8.0
 
-# Constants for an export in single precision (`urdfkin.export.single`); derivation above.
+# Constants for an export in single precision (`urdfkin.export.single`), derived above
 
 SINGLE_EPS = 2.0**-23
 #: The smallest normal number, and the largest number.
@@ -219,57 +217,57 @@ SINGLE_OPERATION = {
 #: Absolute error (in eps) of a sine or cosine that is computed by a polynomial.
 SINGLE_POLYNOMIAL = 1.0
 
-# Rounding errors of the pose of one joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
+# Rounding errors of the pose of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`)
 
-#: Allowed difference (in eps) between the constant poses that two programs read from the same file, for each
-#: URDF joint. If all roundings add up, the difference is 18.9. This is the sum of the first table in the
-#: module docstring, without the rotation about the axis. The standard deviation of the difference is 2.4, so
-#: 13.7 is nearly six standard deviations.
+#: Allowed difference (in eps), for each joint, of the constant poses that two programs read from one file.
+#: If all roundings add up, the difference is 18.9.
+#: This is the sum of the first table in the module docstring, without the rotation about the axis.
+#: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
-#: Error (in eps) of the directions of two joint axes. Dividing an axis by its length has an error of 0.5.
-#: Rotating it by Rodrigues' formula has an error of 2.0.
+#: Error (in eps) of the directions of two joint axes.
+#: Dividing an axis by its length has an error of 0.5; rotating it by Rodrigues' formula has one of 2.0.
 AXES = 5.0
-#: Error (in eps) for each joint, caused by the program that wrote the file. A double that is written with
-#: fifteen digits (DBL_DIG) has an error of half a unit in the last digit. This is 5e-15 rad, or 22.5 eps, for
-#: an angle up to pi. The number counts this error twice, for roll and for pitch, because both tilt an axis.
+#: Error (in eps) for each joint, caused by the program that wrote the file.
+#: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
+#: This is 5e-15 rad, or 22.5 eps, for an angle up to pi.
+#: The number counts this error twice, for roll and for pitch, because both tilt an axis.
 #: Yaw does not tilt it.
 WRITTEN = 45.0
-#: Error of a length along an axis, in units of eps times the length of the path. The dot product has an error
-#: of 2.4, and each sum has an error of 0.5 of its own value. Only a few of these sums are nearly as large as
-#: the path's length.
+#: Error of a length along an axis, in units of eps times the length of the path.
+#: The dot product has an error of 2.4, and each sum has an error of 0.5 of its own value.
+#: Only a few of these sums are nearly as large as the path's length.
 SUMMED = 4.0
 
 # Tolerances: a number that differs less than this from a round number is replaced by the round number.
 
-#: Error (in eps) of an angle up to pi. It is the sum of three errors, rounded up: 1.2 for a computed multiple
-#: of pi/12, 1.0 for a number in a file (half a unit in the last place), and 1.1 for arctan2.
+#: Error (in eps) of an angle up to pi: the sum of three errors, rounded up.
+#: They are 1.2 for a computed multiple of pi/12, and 1.1 for arctan2.
+#: The third is 1.0 for a number in a file (half a unit in the last place).
 ANGLE = 4.0
-#: Error (in eps) of an entry of a rotation matrix. The entry is a difference of two products, which has an
-#: error of 0.75. One factor of these products is also a difference of two products, with another error of
-#: 0.75.
+#: Error (in eps) of an entry of a rotation matrix.
+#: The entry is a difference of two products, which has an error of 0.75.
+#: A factor of these products is also a difference of two products, with another error of 0.75.
 ENTRY = 2.0
-#: Error of a length that is rounded to twelve digits. Its unit is that of `SUMMED`: eps times the length of
-#: the path.
+#: Error of a length that is rounded to twelve digits, in the unit of `SUMMED`.
 DIGITS = SUMMED / 2.0
-#: Error (in eps) of the angle between two rotations. One rotation is computed from roll, pitch and yaw, with
-#: an error of 3.1. The other is a product of three rotations. Its errors are 0.5 for the sines, 0.5 for the
-#: cosines, and 1.4 and 1.8 for the two products.
+#: Error (in eps) of the angle between two rotations.
+#: One rotation is computed from roll, pitch and yaw, with an error of 3.1.
+#: The other is a product of three rotations.
+#: Its errors are 0.5 for the sines, 0.5 for the cosines, and 1.4 and 1.8 for the two products.
 TURN = 8.0
 
-#: Error (in eps) of a limit of a mimic joint after its conversion to a limit of the mimicked joint. The
-#: conversion consists of a subtraction and a division, and the mimic rule consists of a multiplication and an
-#: addition. Each of these four operations has an error of 0.5. The sum 2.0 is doubled, so that a value at the
-#: limits is accepted.
+#: Error (in eps) of a limit of a mimic joint after its conversion to a limit of the mimicked joint.
+#: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
+#: Each of these four operations has an error of 0.5.
+#: The sum 2.0 is doubled, so that a value at the limits is accepted.
 FOLLOWER = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
     """Return the allowed difference (in eps) of two programs with the same URDF, for each factor of a term.
 
-    Args:
-        joints: (...,) number of joints on the path.
-        tilt: (...,) radians, the sum over the path's joints of the angle between Pinocchio's axis and the
-            file's axis.
+    `joints` is the number of joints on the path. `tilt` is the sum over these joints of the angle (radians)
+    between Pinocchio's axis and the file's axis.
 
     >>> of_joints([7, 8]).tolist()
     [168.0, 192.0]

@@ -1,6 +1,4 @@
-"""The textbook's equations as data.
-
-Each equation has its statement, its meaning, its functions and its tests.
+"""The textbook's equations as data: each has its statement, its meaning, its functions and its tests.
 
 The TOML files in `data` are the only source. This module generates `docs/equations.md` and the output of
 `urdfkin explain 7.130` from them. A test checks that every function and every test that these files name
@@ -23,8 +21,8 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST = 130
-#: Numbers of the equations that are unknown, because page 2 of the chapter is lost. Equation 7.7 is on that
-#: page too, but section 7.2 repeats it.
+#: Numbers of the unknown equations: page 2 of the chapter is lost.
+#: Equation 7.7 is on that page too, but section 7.2 repeats it.
 LOST = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
@@ -68,13 +66,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A section of the chapter.
-
-    Attributes:
-        number: The printed number; for several sections, a list such as "7.2.4, 7.2.5".
-        title: The title.
-        equations: The equations in order.
-    """
+    """A section of the chapter; for several sections, `number` is a list such as "7.2.4, 7.2.5"."""
 
     number: str
     title: str
@@ -87,8 +79,6 @@ class Misprint:
 
     Attributes:
         where: The place of the misprint in the chapter.
-        printed: The printed statement.
-        correct: The correct statement.
         proof: The reason why the printed statement is wrong, in one sentence.
         test: The test that proves it, "file::name".
     """
@@ -102,19 +92,17 @@ class Misprint:
 
 @cache
 def sections() -> tuple[Section, ...]:
-    """Return the chapter's sections with their equations, in order."""
     return tuple(_section(_read(name)) for name in _FILES)
 
 
 @cache
 def equations() -> dict[str, Equation]:
-    """Return all equations in the order of the chapter. The key is the number of the equation."""
+    """Return the equations by number, in the order of the chapter."""
     return {equation.number: equation for section in sections() for equation in section.equations}
 
 
 @cache
 def misprints() -> tuple[Misprint, ...]:
-    """Return the misprints of the chapter with their proofs."""
     return tuple(Misprint(**entry) for entry in _read("misprints")["misprint"])
 
 
@@ -146,7 +134,7 @@ def _equation(entry: dict[str, Any]) -> Equation:
 
 
 def table() -> str:
-    """Return the text of the page docs/equations.md in Markdown."""
+    """Return the text of the page docs/equations.md."""
     parts = [_head()]
     for section in sections():
         parts += [
@@ -211,19 +199,10 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 
 
 def explain(number: str) -> str | None:
-    """Return a page about an equation, with its meaning, functions and tests, or None.
+    """Return a page of plain text about "7.130", "(7.130)" or "eq. 7.130"; None if there is no such equation.
 
-    The result is None if there is no equation with this number.
-
-    Args:
-        number: "7.130", "(7.130)" or "eq. 7.130".
-
-    Returns:
-        A page of plain text, or None.
-
-    Example:
-        >>> print(explain("7.5").splitlines()[2])
-        R_0_1 = R(theta1) = [[cos, -sin], [sin, cos]]
+    >>> print(explain("7.5").splitlines()[2])
+    R_0_1 = R(theta1) = [[cos, -sin], [sin, cos]]
     """
     match = _NUMBER.match(number.strip())
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST:
@@ -259,7 +238,6 @@ def _page(equation: Equation) -> str:
 
 
 def _source(name: str) -> list[str]:
-    """Return the source code of an equation's function, below a title."""
     source = textwrap.indent(inspect.getsource(getattr(chapter, name)).rstrip(), "    ")
     return ["code in urdfkin/kinematics/equations.py, and LaTeX", "", source]
 
