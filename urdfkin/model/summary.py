@@ -20,11 +20,7 @@ _AFTER_JOINT = (1, 2, *(i + 1 for i in WORDS[2:]))
 def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
     """Return the summary of a robot for a terminal or a notebook: one table that also shows the tree.
 
-    Args:
-        tree: The robot.
-        base: Default base of a chain.
-        tip: Default tip of a chain.
-        order: A sentence that says how the joints are ordered; it is printed below the table.
+    `order` is a sentence that says how the joints are ordered; it is printed below the table.
     """
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]
