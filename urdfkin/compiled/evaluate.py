@@ -44,11 +44,9 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: If the results have at least this number of bytes, they are written to memory and not to the caches, which
-#: are too small.
+#: Results with at least this number of bytes are written to memory, because the caches are too small.
 _STREAMED = 2 << 20
-#: Largest number of doubles in the buffer of results. A full buffer fills half of the processor's first-level
-#: cache.
+#: Largest number of doubles in the buffer of results, which fills half of the first-level cache
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -61,8 +59,7 @@ class How(TypedDict, total=False):
         base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
         out: C-contiguous float64 array of the result's size, for the result.
         threads: Largest number of threads; None uses all processors for large batches.
-        read: Whether the caller reads the results immediately. If True, the results stay in the processor's
-            caches.
+        read: Whether the caller reads the results immediately, so that they stay in the processor's caches.
     """
 
     base: FloatArray
@@ -161,9 +158,7 @@ def _compute(
 ) -> FloatArray:
     """Return a result (n, frames, *shape) that is computed from q, or q and v, or q, v and a.
 
-    Raises:
-        NotFiniteError: an input is not finite.
-        RangeError: a result is not finite, although the inputs are.
+    An input that is not finite raises NotFiniteError; a result that is not finite raises RangeError.
     """
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
@@ -235,10 +230,7 @@ def _compiled(
     *,
     staged: bool,
 ) -> int:
-    """Compute with a compiled kernel.
-
-    Return whether an input is not ordinary (nan, infinite or too large).
-    """
+    """Compute with a compiled kernel; return whether an input is nan, infinite or too large."""
     core = preload.kernel(name)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
@@ -264,14 +256,8 @@ def task_of(
 ) -> tuple[NDArray[np.int64], object]:
     """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished.
 
-    Args:
-        program: The program of the recursion.
-        reference: The reference frame of the results.
-        inputs: Arrays: the base's state, q and, if needed, v and a. Each array has one row for all
-            configurations, or one row for each configuration.
-        out: (n, ...) array for the result.
-        staged: Whether the kernel writes results to a buffer first, and then copies the buffer to `out` (see
-            `is_staged`).
+    `inputs` are the base's state, q and, if needed, v and a; each has one row, or one row for each
+    configuration. If `staged`, the kernel writes results to a buffer first (see `is_staged`).
     """
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
@@ -297,7 +283,6 @@ def _is_large(base: FloatArray) -> bool:
 
 
 def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Raise an error if an input or a result is not finite."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))
@@ -323,10 +308,7 @@ Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
 def default_threads(n: int) -> int:
-    """Return the default number of threads for n configurations.
-
-    The number is 1 for a small batch, else the number of processors that this process may use.
-    """
+    """Return 1 for a small batch, else the number of processors that this process may use."""
     return _processors() if n >= _WORTH_THREADS else 1
 
 
@@ -340,16 +322,9 @@ def _processors() -> int:
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
     """Compute `out` (n, ...) with several threads; each array of `inputs` is (n, ...) or (1, ...).
 
-    The result is 1 if an input is nan, infinite or too large, else 0.
-
-    Args:
-        compute: The computation, which must release Python's global interpreter lock.
-        inputs: C-contiguous arrays.
-        out: C-contiguous array.
-        threads: Largest number of threads; None for the number from `default_threads`.
-
-    Raises:
-        InputError: `threads` is not an integer of at least 1.
+    The result is 1 if an input is nan, infinite or too large, else 0. All arrays are C-contiguous. `compute`
+    must release Python's global interpreter lock. `threads` is the largest number of threads; None stands for
+    `default_threads`, and a number below 1 raises InputError.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
@@ -361,20 +336,14 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         return compute(inputs, out)
     parts = _parts(n, threads)
     work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
-    return max([future.result() for future in work])  # this waits until all threads have finished
+    return max([future.result() for future in work])  # This waits until all threads have finished.
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
-    Args:
-        compute: Computes the rows of a slice. For an empty batch, this function is called once, with an empty
-            slice.
-        n: Number of rows.
-        threads: Largest number of threads, as in `in_blocks`.
-
-    Raises:
-        InputError: `threads` is not an integer of at least 1.
+    `compute` computes the rows of a slice. For an empty batch, it is called once, with an empty slice.
+    `threads` has the same meaning as in `in_blocks`.
     """
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
@@ -388,7 +357,7 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
     if len(shares) == 1:
         return compute_all(parts)
     work = [_pool().submit(compute_all, share) for share in shares]
-    wait(work)  # an error is raised only after all threads have finished writing
+    wait(work)  # An error is raised only after all threads have finished writing.
     for future in work:
         future.result()
     return None

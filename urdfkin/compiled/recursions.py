@@ -71,10 +71,7 @@ def jacobian_rates(task):
 
 
 def hessians(task):
-    """Compute the derivative of each Jacobian column (7.85) with respect to each joint's motion.
-
-    The kernel is compiled only when it is needed.
-    """
+    """Compute the derivative of each Jacobian column (7.85) with respect to each joint's motion."""
     return forward_recursion(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_pairs)
 
 
