@@ -30,9 +30,10 @@ from urdfkin.calibration.parameters import Model, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
-#: Limits of the rms position error, as fractions of the reach. A fit with an error above `_MISSED` is
-#: refused. The comments of `_UNEXPLAINED` and `_HARDLY_BELOW` explain `_CLOSE_BY` and `_NO_BETTER`. If the
-#: error is above `_SUSPECT`, urdfkin corrects each common mistake in the data and fits again.
+#: Limits of the rms position error, as fractions of the reach.
+#: A fit with an error above `_MISSED` is refused.
+#: The comments of `_UNEXPLAINED` and `_HARDLY_BELOW` explain `_CLOSE_BY` and `_NO_BETTER`.
+#: Above `_SUSPECT`, urdfkin corrects each common mistake in the data and fits again.
 _MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
 #: Largest error of a fit, as a fraction of the spread of measured positions.
 #: A fit with a larger error is refused if the error also exceeds `_CLOSE_BY` times the reach.
@@ -40,8 +41,9 @@ _UNEXPLAINED = 0.25
 #: Largest error of a fit, as a fraction of the error before the fit.
 #: A fit with a larger error is refused if the error also exceeds `_NO_BETTER` times the reach.
 _HARDLY_BELOW = 0.7
-#: Limits of the rms orientation error, radians. A fit with an error above `_MISTURNED` is refused. If the
-#: error is above `_SUSPECT_TURN`, urdfkin corrects each common mistake in the data and fits again.
+#: Limits of the rms orientation error, radians.
+#: A fit with an error above `_MISTURNED` is refused.
+#: Above `_SUSPECT_TURN`, urdfkin corrects each common mistake in the data and fits again.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
 #: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
@@ -50,11 +52,11 @@ _ONE_CONFIGURATION = 1e-6
 #: urdfkin subtracts this number of standard deviations from a change, and compares the rest with the limit.
 #: The reason is that the tilt of an axis near the target is poorly observable.
 _UNCERTAIN = 5.0
-#: Largest error after a correction, as a fraction of the error before the correction. The limit is `_BETTER`
-#: if the fit before the correction is accepted, and `_NOT_WORSE` if that fit is refused.
+#: Largest error after a correction, as a fraction of the error before the correction.
+#: The limit is `_BETTER` for an accepted fit before the correction, and `_NOT_WORSE` for a refused one.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted, beginning with the most promising corrections. Other corrections
-#: assign each row of q to the pose that is one or two rows earlier or later (`_SHIFTS`).
+#: `_FITTED` is the number of corrections that are fitted; the most promising ones are fitted first.
+#: A correction of `_SHIFTS` assigns each row of q to the pose that is one or two rows earlier or later.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
 #: Largest number of joints that a message names.
 _NAMED = 4
@@ -98,10 +100,7 @@ class Ended:
 def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
     """Check whether a fit is plausible, and find the likeliest mistake if it is not.
 
-    Args:
-        model: The model.
-        ended: The fit with its data.
-        radians: Whether large joint angles are known to be radians.
+    `radians` says whether large joint angles are known to be radians.
     """
     few = _too_few(ended)
     misfits = [*_misfits(model, ended), *_extreme_parameters(model, ended)]
@@ -190,10 +189,7 @@ def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
-    """Return the joints whose zero changed by about half a turn.
-
-    A reversed sign of the next joint causes such a change.
-    """
+    """Return the joints whose zero changed by about half a turn, as after a sign error of the next joint."""
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
         for parameter, moved, surely in _changes(model, ended)
@@ -338,8 +334,6 @@ def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
 
 
 class _Trial:
-    """A correction and its fit."""
-
     def __init__(self, model: Model, ended: Ended, correction: _Correction, reach: float) -> None:
         self.model, self.correction, self.reach = model, correction, reach
         chosen = slice(correction.first, correction.last)

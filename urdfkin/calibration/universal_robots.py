@@ -45,12 +45,10 @@ LINKS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: SciPy's names of the two orders.
-#: Lowercase letters are rotations about fixed axes, uppercase letters are rotations about moving axes.
+#: SciPy's names of the two orders; lowercase letters are fixed axes, uppercase letters moving axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of configurations for the fit of the origins. The check of the fit uses the same number of other
-#: configurations.
+#: Number of configurations for the fit of the origins, and of other configurations for its check
 _FITTED = 40
 #: Seeds of the random configurations for the fit of the origins, and for the check of this fit.
 _FITTED_SEED, _CHECKED_SEED = 2, 3
@@ -64,14 +62,9 @@ _COMPARED = 1000
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
     """Read the (4, 4) origin of each joint; the keys are joint names without a prefix.
 
-    Args:
-        path: The driver's YAML, or a `default_kinematics.yaml` of its robot description.
-        order: Order of the rotations: "driver" or "urdf".
-
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: the file is not a calibration, or a link or a number is missing.
-        UnknownNameError: the order is unknown.
+    The file is the driver's YAML, or a `default_kinematics.yaml` of its robot description. A file that cannot
+    be read raises SourceError. A file that is not a calibration, or lacks a link or a number, raises
+    InputError. An order other than "driver" and "urdf" raises UnknownNameError.
     """
     if order not in ORDERS:
         raise UnknownNameError("order of rotations", order, ORDERS)
@@ -123,18 +116,9 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
     In the current ROS description all six joints turn about z. The joint origins are then replaced by the
     origins in the calibration file. In other URDFs, for example of the older ROS description, the joint
-    origins are fitted. The fitted arm then has the same poses of `tool0` in `base` as the calibrated arm.
-
-    Args:
-        robot: The arm.
-        path: The driver's YAML file.
-        order: Order of the rotations in the file: "driver" agrees with the robot's controller, "urdf" with
-            the ROS description.
-
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: the file is not a calibration, or the robot is not a Universal Robots arm.
-        UnknownNameError: the order is unknown.
+    origins are fitted. The fitted arm then has the same poses of `tool0` in `base` as the calibrated arm. A
+    robot that is not a Universal Robots arm raises InputError; the errors of the file are those of
+    `read_calibration`.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)

@@ -86,7 +86,7 @@ _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 _GENERIC = 3
 #: Members for internal use, hidden from name completion.
 _INSIDE = {"plan", "verifier"}
-#: Largest number of float64 values in an array, because its number of bytes must fit in 63 bits.
+#: Largest number of float64 values in an array: its number of bytes must fit in 63 bits.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
@@ -163,17 +163,15 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: For a USD stage with numbers in single precision: bounds on the resulting errors of link and joint
-        #: poses. None if the numbers have double precision.
+        #: Bounds on the errors of poses for a USD stage in single precision; None in double precision
         self.single: SinglePrecision | None = None
-        #: For a robot from a USD stage: the path of the prim of each link.
+        #: The path of the prim of each link, for a robot from a USD stage
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: Fast evaluators of frames. Those in `_prepared` do not check results, and those in `_checked` check
-        #: each result.
+        #: Fast evaluators of frames: those in `_prepared` do not check results, those in `_checked` do.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
@@ -405,10 +403,7 @@ class Robot(Displayable):
         return self._tip_frame
 
     def _default_frame(self) -> str:
-        """Return the tip that the catalogue names, or the only leaf link.
-
-        Raise InputError if there are several leaves.
-        """
+        """Return the tip that the catalogue names, or the only leaf; raise InputError for several leaves."""
         if not self._has_one_tip:
             leaves = [self.tree.frame_name(leaf) for leaf in self.tree.leaves()]
             raise InputError(
@@ -524,7 +519,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        found = configuration.checked(self.tree, q, "q", look=False)  # limit_violations asks about degrees
+        found = configuration.checked(self.tree, q, "q", look=False)  # The lines already ask about degrees.
         return configuration.limit_violations(self.tree, found)
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
@@ -665,7 +660,7 @@ class Robot(Displayable):
         (12,)
         """
         with importing:
-            from urdfkin.model.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
+            from urdfkin.model.conventions import Conversion, find_convention  # noqa: PLC0415
 
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
 
@@ -813,10 +808,10 @@ class Robot(Displayable):
         [0.4, 0.0, 0.0]
         """
         with importing:
-            from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need these imports
+            from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need it
 
         name = as_str(relative_to, "relative_to")
-        # an error message contains a line that repeats the call, with plain strings
+        # An error message contains a line that repeats the call, with plain strings.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
@@ -1142,7 +1137,7 @@ class Robot(Displayable):
                 near.append((error.distance, part.start + error.sample[0]))
 
         with importing:
-            from urdfkin.compiled.evaluate import in_parts  # noqa: PLC0415  few calls need this import
+            from urdfkin.compiled.evaluate import in_parts  # noqa: PLC0415  few calls need it
 
         in_parts(compute, call.n, threads)
         if near:
@@ -1251,7 +1246,7 @@ class Robot(Displayable):
         True
         """
         with importing:
-            from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads python-flint
+            from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  it loads python-flint
 
         frame = self._default_frame() if frame is None else frame
         inputs, hessian = (q, v, a), as_bool(hessian, "hessian")
@@ -1308,7 +1303,7 @@ class Robot(Displayable):
         [0.9, 0.0, 0.0]
         """
         with importing:
-            from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  rarely used
+            from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  few calls need it
 
         frame = self._default_frame() if frame is None else frame
         self.tree.frame_link(frame)
@@ -1395,7 +1390,7 @@ class Robot(Displayable):
         True
         """
         with importing:
-            from urdfkin.export.python import need_torch, torch_module  # noqa: PLC0415  rarely used
+            from urdfkin.export.python import need_torch, torch_module  # noqa: PLC0415  few calls need it
 
         need_torch()
         return torch_module(self.export("torch", frame, quantities, reference, verify=verify))
@@ -1625,10 +1620,7 @@ class Robot(Displayable):
         return result
 
     def _sampled(self, frame: str) -> FloatArray:
-        """Return Jacobians (n, 6, nv) of a frame at random configurations.
-
-        They are neither checked nor recorded.
-        """
+        """Return unchecked Jacobians (n, 6, nv) of a frame at random configurations."""
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_GENERIC),))
         found: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
         return found[:, 0]
@@ -1651,16 +1643,15 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         """Return the fast evaluator of a frame, which is made at the first call."""
-        # If the reference frame is the default and `frame` is a string, this string is the dictionary's key.
-        # This saves time, because the hash of an enumeration member is slow. Other keys also contain the
-        # types: an enumeration member would otherwise equal its number, and `LinkFrame("link:a")` would equal
-        # the name "link:a".
+        # The plain name is the key in most cases, because the hash of an enumeration member is slow.
+        # Other keys also contain the types: an enumeration member would otherwise equal its number.
+        # Without its type, `LinkFrame("link:a")` would equal the name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
         try:
             prepared = known.get(key)
-        except TypeError:  # not hashable, therefore not a valid name
+        except TypeError:  # The key is not hashable, so the name is not valid.
             self.tree.frame_link(frame)
             return self._prepare(frame, Reference.of(reference), verify=verify)
         if prepared is None:
@@ -1671,8 +1662,7 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: Regular expressions for items of a list: in the docstring of `Robot`, and in the section `Args` or `Raises`
-#: of a method.
+#: Items of the lists in the docstring of `Robot`, and in the section `Args` or `Raises` of a method
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
@@ -1680,7 +1670,7 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
     """Return the docstring of a method of `Robot`, completed with the shared arguments and errors.
 
-    The dictionary `QUANTITIES` contains the shape, the units and the equations of the result.
+    `QUANTITIES` contains the shape, the units and the equations of the result.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)
@@ -1706,10 +1696,7 @@ def _indented(items: Sequence[str]) -> str:
 
 
 def _complete_docstrings() -> None:
-    """Add the descriptions of shared arguments and errors to the methods' docstrings.
-
-    `Robot.__doc__` contains them.
-    """
+    """Add the shared arguments and errors of `Robot.__doc__` to the methods' docstrings."""
     arguments, _, errors = cleandoc(Robot.__doc__ or "").partition("They share these errors:")
     shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
     for method in vars(Robot).values():
