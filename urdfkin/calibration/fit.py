@@ -166,7 +166,7 @@ _ONE_OR_MORE = 0.5
 #: An eigenvalue of 1 - H_ii below this fraction of the largest eigenvalue is replaced by zero.
 #: The residuals do not show an error of the pose along the eigenvector of such an eigenvalue.
 _FOLLOWED = 1e-9
-#: Largest number of noise estimates, and the relative change of the noise that ends the estimation
+#: At most `_ESTIMATES` noises are estimated; a relative change of at most `_STAYS` ends the estimation.
 _ESTIMATES, _STAYS = 20, 1e-3
 #: Probability that an outlier is reported for a data set that has no outliers.
 WRONGLY = 0.01

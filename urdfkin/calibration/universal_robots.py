@@ -48,7 +48,7 @@ LINKS = {
 #: SciPy's names of the two orders; lowercase letters are fixed axes, uppercase letters moving axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of configurations for the fit of the origins, and of other configurations for its check
+#: The fit of the origins uses this number of configurations; its check uses as many others.
 _FITTED = 40
 #: Seeds of the random configurations for the fit of the origins, and for the check of this fit.
 _FITTED_SEED, _CHECKED_SEED = 2, 3

@@ -28,7 +28,7 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import before, numbers, with_attributes
 from urdfkin.verify.certificate import Certificate
 
-#: Number of decimals of written metres and radians: the precision of a double near 1 m or 1 rad
+#: Metres and radians are written with this number of decimals, the precision of a double near 1.
 _DECIMALS = 15
 _SAME = 10.0**-_DECIMALS
 

@@ -46,7 +46,7 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
 #: Results with at least this number of bytes are written to memory, because the caches are too small.
 _STREAMED = 2 << 20
-#: Largest number of doubles in the buffer of results, which fills half of the first-level cache
+#: The buffer of results has at most this number of doubles, which fill half of the first-level cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A

@@ -328,7 +328,7 @@ class Op(IntEnum):
     FLOATING = 12
     SAVE = 13
     RESUME = 14
-    KEEP = 15  # store the data that the joint's Jacobian column needs
+    KEEP = 15  # It stores the data that the joint's Jacobian column needs.
     COLUMN = 16
     EMIT = 17
 
@@ -340,15 +340,15 @@ class Head(IntEnum):
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # index of the list of blocks to read from q; a block is eight coordinates
+    BLOCKS_Q = 4  # index of the blocks of q (eight coordinates each)
     BLOCKS_V = 5
     BLOCKS_END = 6
-    ANGLES = 7  # start of the list of joint angles
+    ANGLES = 7  # start of the joint angles
     ANGLES_END = 8
     Q = 9  # first scratch row of the coordinates
     V = 10  # first scratch row of the velocities
     A = 11  # first scratch row of the accelerations
-    BASE = 12  # first scratch row of the base's pose, velocity and acceleration
+    BASE = 12  # first scratch row of the base's motion
 
 
 #: Number of doubles in a row of scratch memory: one double for each of eight configurations.
@@ -627,7 +627,7 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Number of doubles from one configuration to the next; 0 if all configurations use the same numbers
+    #: A stride is the number of doubles between two configurations; 0 if all use the same numbers.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
@@ -635,7 +635,7 @@ class KernelArgs(IntEnum):
     OUT = auto()
     #: Number of output numbers for one configuration.
     WIDTH = auto()
-    #: Address of a buffer that collects a block's results before they are written to the output, or 0
+    #: The buffer at this address collects a block's results before they are written; 0 means no buffer.
     STAGE = auto()
 
     CORE = auto()

@@ -128,7 +128,7 @@ def _on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: Code that ends the second process when its standard input closes, because this process has ended
+#: This code ends the second process when its standard input closes, that is, when this process ends.
 _UNTIL_CLOSED = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"

@@ -198,7 +198,7 @@ MJCF_RULE = 8.0
 #: Allowed error (in eps) for each row of a Denavit-Hartenberg table (derived above).
 ROW = 8.0
 
-# Constants for an export in single precision (`urdfkin.export.single`), derived above
+# Exports in single precision use these constants (`urdfkin.export.single`); they are derived above.
 
 SINGLE_EPS = 2.0**-23
 #: The smallest normal number, and the largest number.
@@ -217,7 +217,7 @@ SINGLE_OPERATION = {
 #: Absolute error (in eps) of a sine or cosine that is computed by a polynomial.
 SINGLE_POLYNOMIAL = 1.0
 
-# Rounding errors of the pose of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`)
+# These are rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
 #: Allowed difference (in eps), for each joint, of the constant poses that two programs read from one file.
 #: If all roundings add up, the difference is 18.9.

@@ -163,9 +163,9 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Bounds on the errors of poses for a USD stage in single precision; None in double precision
+        #: A USD stage in single precision has bounds on the errors of poses; None means double precision.
         self.single: SinglePrecision | None = None
-        #: The path of the prim of each link, for a robot from a USD stage
+        #: If the robot is from a USD stage, each link has the path of its prim.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
@@ -1662,7 +1662,7 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: Items of the lists in the docstring of `Robot`, and in the section `Args` or `Raises` of a method
+#: The docstring of `Robot` has lists of shared items; a method has the sections `Args` and `Raises`.
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
-#: Codes of findings that only help the author of a URDF file, not of a URDF that urdfkin generates
+#: These findings only help the author of a URDF file. They are not reported for generated URDFs.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of each array, by the array's name, without the first axis (the index of the sample)
+#: Each array has a shape, which is stated without the first axis (the index of the sample).
 Shapes = Mapping[str, tuple[int, ...]]
 
 
@@ -492,7 +492,7 @@ def read_columns(
 
 #: Allowed names of the time column
 _TIMES = ("t", "time", "timestamp")
-#: Number of each time unit in one second
+#: One second has this number of units.
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,

@@ -118,7 +118,7 @@ def _at_address(kind: Any) -> Any:
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Largest number of doubles that are prefetched, which fill half of a processor's first-level cache
+#: At most this number of doubles are prefetched; they fill half of the first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 

@@ -43,7 +43,7 @@ _AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelA
 
 #: Number of words (of eight bytes) in the header of a Python object.
 _OWN = object.__basicsize__ // 8
-#: Indices of 8-byte words: the word with the type of an object, and that with the first item of a tuple
+#: `_TYPE` is the 8-byte word with an object's type, `_ITEMS` that with the first item of a tuple.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words in a NumPy array (the C structure PyArrayObject_fields).
 #: The number of axes and the flags are numbers of four bytes.

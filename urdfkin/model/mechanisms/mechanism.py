@@ -124,7 +124,7 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 
 #: Relative tolerance for the entries of a computed pose.
 NEARLY = 1e-9
-#: A pose (x, y, angle) of a planar joint for tests, in which no coordinate (m, m, rad) is 0
+#: Tests use this pose (x, y, angle) of a planar joint, in which no coordinate (m, m, rad) is 0.
 _AWAY = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
@@ -265,9 +265,9 @@ class Mechanism:
                 bodies[body[-1]].append(i + 1)
         self.homes, self.body_of, self.edges = homes, body, edges
         self.bodies = bodies
-        #: Runs of consecutive joints that `in_order` put in another order, each in its new order
+        #: Each entry lists consecutive joints that `in_order` put in another order, in this new order.
         self.orders: tuple[tuple[str, ...], ...] = ()
-        #: Length (m) of the path from the root to each link, and number of joints on it
+        #: Each link has the length (m) of the path from the root and the number of joints on it.
         self.lengths, self.depths = lengths, depths
         self._screws: dict[int, Screw] = {}
 
