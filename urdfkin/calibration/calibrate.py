@@ -14,7 +14,7 @@ placement --format csv` writes it. An .npz file contains q (n, nq) and the poses
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +30,7 @@ from urdfkin.calibration.fit import (
     Noise,
     best_fit,
     demand_plausible,
+    first_names,
     identify,
     odd_poses,
     quantile,
@@ -45,7 +46,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_choice, as_names, as_str, real_number, safe_repr
 from urdfkin.kinematics.inputs import rotation_defect, scalars
-from urdfkin.kinematics.rotation import rotation_of
+from urdfkin.kinematics.rotation import polar_factor, rotation_of
 from urdfkin.model.configuration import checked
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -513,13 +514,13 @@ def _doubts(found: Calibration) -> Iterator[str]:
         others = [k for k in found.general.kept if k not in found.identification.kept]
         yield (
             f"{found.identification.rank} parameters are identifiable from these poses; more varied poses "
-            f"would identify {lost} more: {_list(name[k] for k in others)}"
+            f"would identify {lost} more: {first_names((name[k] for k in others), _NAMED)}"
         )
     if found.weak:
         worst = sorted(found.weak.items(), key=lambda one: -one[1])
         yield (
             "poorly observable: "
-            + _list(f"{name[k]} ({ratio:.0f} times the usual uncertainty)" for k, ratio in worst)
+            + first_names((f"{name[k]} ({x:.0f} times the usual uncertainty)" for k, x in worst), _NAMED)
             + "; the usual uncertainty is that of the same number of random configurations"
         )
     if not fitted.is_judged:
@@ -536,7 +537,7 @@ def _doubts(found: Calibration) -> Iterator[str]:
         )
     if found.odd and found.without_odd is not None:
         one = len(found.odd) == 1
-        poses = f"pose{'' if one else 's'} {_list(map(str, found.odd))} "
+        poses = f"pose{'' if one else 's'} {first_names(map(str, found.odd), _NAMED)} "
         if len(fitted.errors) == len(found.without_odd.errors):
             yield poses + f"{'is' if one else 'are'} excluded as {'an outlier' if one else 'outliers'}"
         else:
@@ -548,13 +549,9 @@ def _doubts(found: Calibration) -> Iterator[str]:
     gains = [k for k in found.identification.kept if found.parameters[k].what == "gain"]
     if gains:
         yield (
-            f"these gains are not written, because a URDF cannot store them: {_list(name[k] for k in gains)}"
+            "these gains are not written, because a URDF cannot store them: "
+            + first_names((name[k] for k in gains), _NAMED)
         )
-
-
-def _list(names: Iterable[str]) -> str:
-    every = list(names)
-    return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")
 
 
 #: Largest error of a rotation matrix or of a quaternion's length: a file contains rounded digits.
@@ -677,9 +674,8 @@ def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
             where=f"{where}, pose {int(bad.argmax())}",
             found=str(T[bad.argmax()].tolist()),
         )
-    U, _, Vt = np.linalg.svd(R)
     good = T.copy()
-    good[:, :3, :3] = U @ Vt
+    good[:, :3, :3] = polar_factor(R)
     return good
 
 

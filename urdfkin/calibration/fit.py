@@ -52,7 +52,7 @@ therefore computes base and target alternately.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
@@ -156,9 +156,14 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
     )
     shares = np.abs(shares) / np.linalg.norm(column)
     order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _SHARE]
-    names = [str(model.way.parameters[kept[i]]) for i in order[:_NAMED]]
-    more = f" and {len(order) - _NAMED} more" if len(order) > _NAMED else ""
-    return f"same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
+    names = first_names((str(model.way.parameters[kept[i]]) for i in order), _NAMED)
+    return f"same effect as {names}{' together' if len(order) > 1 else ''}"
+
+
+def first_names(names: Iterable[str], most: int) -> str:
+    """Return the first `most` names for a message, and the number of the others."""
+    every = list(names)
+    return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
 #: A fit cannot be checked if the sum of all redundancies is below this number.

@@ -10,9 +10,9 @@ fit is plausible after a correction, the corrected mistake is the likeliest one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from urdfkin.calibration.fit import (
     Noise,
     best_fit,
     errors,
+    first_names,
     identify,
     starting,
 )
@@ -58,8 +59,8 @@ _BETTER, _NOT_WORSE = 0.25, 1.5
 #: `_FITTED` is the number of corrections that are fitted; the most promising ones are fitted first.
 #: A correction of `_SHIFTS` assigns each row of q to the pose that is one or two rows earlier or later.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
-#: Largest number of joints that a message names.
-_NAMED = 4
+#: A message names at most four joints.
+_list = partial(first_names, most=4)
 
 
 @dataclass(frozen=True)
@@ -384,8 +385,3 @@ def _left(ended: Ended, reach: float) -> float:
 def _rms(fit: Fit) -> str:
     metres, turn = fit.rms()
     return length(metres) if turn is None else f"{length(metres)}, {angle(turn)}"
-
-
-def _list(names: Iterable[str]) -> str:
-    every = list(names)
-    return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")

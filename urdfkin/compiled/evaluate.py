@@ -162,7 +162,8 @@ def _compute(
     """
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    inputs = [base, *(x[:1] if _is_broadcast(x) else x for x in inputs)]
+    # An array with the stride 0 is one row that was broadcast to all rows.
+    inputs = [base, *(x[:1] if len(x) > 1 and x.strides[0] == 0 else x for x in inputs)]
     if (odd := _interpreted(name, program, reference, inputs, out, threads)) is None:
         odd = _compiled(name, program, reference, inputs, out, threads, staged=is_staged(out) and not read)
     if odd or plan.is_large or _is_large(base):
@@ -271,11 +272,6 @@ def task_of(
     if inputs[0] is STILL_STATE:
         task[KernelArgs.BASE] = 0
     return task, (memory, stage)
-
-
-def _is_broadcast(x: FloatArray) -> bool:
-    """Return whether the array is one row that was broadcast to all rows."""
-    return len(x) > 1 and x.strides[0] == 0
 
 
 def _is_large(base: FloatArray) -> bool:

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from urdfkin.compiled.python_numbers import LARGE, Number
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, pose
 
 IntArray = NDArray[np.int64]
 
@@ -197,7 +197,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
         frames=np.array(
             [[end.step, place] for end, place in zip(ends, order, strict=True)], dtype=np.int64
         ).reshape(-1, 2),
-        offsets=np.array([(*end.T[:3, :3].ravel(), *end.T[:3, 3]) for end in ends]).reshape(-1, 12),
+        offsets=np.array([_flat(end.T) for end in ends]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,
         leaders=leaders[order],
@@ -254,10 +254,7 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 def turned(joint: Joint) -> FloatArray:
     """Return the pose (4, 4) of a frame whose z axis is the joint's axis, in the joint's URDF frame."""
-    A = np.eye(4)
-    if joint.kind.has_axis:
-        A[:3, :3] = axis_aligning(joint.axis)
-    return A
+    return pose(axis_aligning(joint.axis) if joint.kind.has_axis else None)
 
 
 def _flat(T: FloatArray) -> FloatArray:

@@ -69,11 +69,6 @@ class MovingFrame:
             object.__setattr__(self, entry.name, array)
 
 
-def turned(R: FloatArray, p: FloatArray) -> FloatArray:
-    """Return R p for R (..., 3, 3) and p (..., 3)."""
-    return (R @ p[..., np.newaxis])[..., 0]
-
-
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
 
@@ -84,8 +79,8 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     + w_12, which contains the term w_01 x w_12.
     """
     R, w = outer.R_0_1, outer.w_0_1
-    d_12, v_12, a_12 = (turned(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
-    w_12, alpha_12 = turned(R, inner.w_0_1), turned(R, inner.alpha_0_1)
+    d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
+    w_12, alpha_12 = eq.rotate(R, inner.w_0_1), eq.rotate(R, inner.alpha_0_1)
     return MovingFrame(
         R @ inner.R_0_1,
         outer.d_0_1 + d_12,
@@ -109,7 +104,7 @@ def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = Non
     T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
     back = T_0_1[..., :3, :3].swapaxes(-1, -2)
     T[..., :3, :3] = back @ T_0_2[..., :3, :3]
-    T[..., :3, 3] = turned(back, T_0_2[..., :3, 3] - T_0_1[..., :3, 3])
+    T[..., :3, 3] = eq.rotate(back, T_0_2[..., :3, 3] - T_0_1[..., :3, 3])
     T[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
     return T
 
@@ -167,9 +162,9 @@ def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
     """Return p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if the point is fixed in frame 1)."""
-    p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
+    p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
-    relative = turned(frame.R_0_1, vectors(v_1, "v_1"))
+    relative = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
     return VelocityParts(*np.broadcast_arrays(rotation, relative, frame.v_0_1))
 
 
@@ -180,9 +175,9 @@ def point_acceleration(
 
     For a point that is fixed in frame 1, the result is equation 7.123.
     """
-    p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
-    v_0 = turned(frame.R_0_1, vectors(v_1, "v_1"))
-    a_0 = turned(frame.R_0_1, vectors(a_1, "a_1"))
+    p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
+    v_0 = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
+    a_0 = eq.rotate(frame.R_0_1, vectors(a_1, "a_1"))
     transverse = eq.transverse(frame.alpha_0_1, p_0)
     centripetal, coriolis = eq.centripetal(frame.w_0_1, p_0), eq.coriolis(frame.w_0_1, v_0)
     return AccelerationParts(*np.broadcast_arrays(transverse, centripetal, coriolis, a_0, frame.a_0_1))
@@ -369,32 +364,3 @@ def _rows(value: ArrayLike, name: str, rows: int) -> FloatArray:
     array = scalars(value, name)
     columns = array.shape[-1] if array.ndim else 0
     return matrices(array, name, rows, columns)
-
-
-__all__ = [
-    "AccelerationParts",
-    "MovingFrame",
-    "VelocityParts",
-    "analytical_jacobian",
-    "compose",
-    "compose_all",
-    "frame_velocity",
-    "interorigin_vector",
-    "interorigin_velocity",
-    "jacobian_column",
-    "joint_angular_velocity",
-    "link_endpoint",
-    "link_endpoint_velocity",
-    "orientation_of",
-    "planar_rotation",
-    "planar_rotation_derivative",
-    "point_acceleration",
-    "point_position",
-    "point_velocity",
-    "pose_rates",
-    "representation_inverse",
-    "representation_matrix",
-    "tool_velocity",
-    "velocity_jacobian",
-    "velocity_of_pose_rates",
-]

@@ -9,7 +9,6 @@ sign of the URDF, because the inverse of a rotation by q about z is a rotation b
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -107,8 +106,10 @@ class FrameChain(Displayable):
         rows = [
             (
                 joint.name,
-                " ".join([joint.kind.value, *["backwards"] * joint.backwards, *_rule_text(joint)]),
-                *("" if joint.limit is None else f"{x:.6g}" for x in _bounds(joint.limit)),
+                joint.kind.value
+                + " backwards" * joint.backwards
+                + (f" = {joint.mimic}" if joint.mimic else ""),
+                *(("", "") if (x := joint.limit) is None else (f"{x.lower:.6g}", f"{x.upper:.6g}")),
                 *origin,
                 *axis,
             )
@@ -237,14 +238,6 @@ class FrameChain(Displayable):
         [[0.5, 0.0, 0.0], [0.4, 0.0, 0.0]]
         """
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
-
-
-def _rule_text(joint: ChainJoint) -> list[str]:
-    return [f"= {joint.mimic}"] if joint.mimic else []
-
-
-def _bounds(limit: Limit | None) -> tuple[float, float]:
-    return (-math.inf, math.inf) if limit is None else (limit.lower, limit.upper)
 
 
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:

@@ -542,27 +542,6 @@ def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | Non
 # -- Pinocchio's layout ------------------------------------------------------------------------------
 
 
-def pinocchio_coordinates(joint: Joint, own: FloatArray) -> FloatArray:
-    """Convert one joint's coordinates (..., joint.kind.nq) to Pinocchio's coordinates (..., k)."""
-    if joint.kind.nq_pinocchio == joint.kind.nq:
-        return own
-    return np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
-
-
-def pinocchio_blocks(tree: KinematicTree, q: FloatArray, *, mimic: bool) -> Iterator[tuple[int, FloatArray]]:
-    """Yield the index and the coordinates of each joint that has coordinates in Pinocchio's model.
-
-    In Pinocchio's default model (`mimic` is False), mimic joints have coordinates too.
-    """
-    for i, (joint, at) in enumerate(zip(tree.joints, tree.q_index, strict=True)):
-        if not _in_pinocchio(joint, mimic=mimic):
-            continue
-        own = q[..., at : at + joint.kind.nq]
-        if joint.mimic:
-            own = joint.mimic.multiplier * own + joint.mimic.offset
-        yield i, pinocchio_coordinates(joint, own)
-
-
 def _in_pinocchio(joint: Joint, *, mimic: bool) -> bool:
     return joint.kind.nq > 0 and not (mimic and joint.mimic)
 
@@ -574,8 +553,17 @@ def _pinocchio_length(tree: KinematicTree, *, mimic: bool) -> int:
 
 def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     """Convert `q` (..., nq) to Pinocchio's layout (..., nq_pinocchio)."""
-    blocks = [block for _, block in pinocchio_blocks(tree, q, mimic=mimic)]
-    return np.concatenate(blocks, axis=-1) if blocks else np.zeros((*q.shape[:-1], 0))
+    blocks = [np.zeros((*q.shape[:-1], 0))]
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        if not _in_pinocchio(joint, mimic=mimic):
+            continue
+        own = q[..., at : at + joint.kind.nq]
+        if joint.mimic:
+            own = joint.mimic.multiplier * own + joint.mimic.offset
+        if joint.kind.nq_pinocchio > joint.kind.nq:
+            own = np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
+        blocks.append(own)
+    return np.concatenate(blocks, axis=-1)
 
 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
@@ -678,12 +666,8 @@ def _uniform(
         if joint.nq == 1:
             q[:, at] = rng.uniform(*ranges[joint.name], (n, 1))[:, 0]
         elif joint.nq:
-            q[:, at : at + joint.nq] = _sample_joint(joint, n, rng)
+            q[:, at : at + joint.nq] = _SAMPLED[joint.kind](n, rng)
     return q
-
-
-def _sample_joint(joint: Joint, n: int, rng: np.random.Generator) -> FloatArray:
-    return _SAMPLED[joint.kind](n, rng)
 
 
 def _sample_planar(n: int, rng: np.random.Generator) -> FloatArray:

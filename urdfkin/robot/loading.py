@@ -188,8 +188,7 @@ def _load_table(
     text = Text(urdf.encode(), name, name)
     robot = robot_of(text, **how, made=True, table=True)
     if checked_choice(how["verify"]):
-        plain = _is_plain(robot)
-        verifier = (robot if plain else robot_of(text)).verifier
+        verifier = _plain(robot, text).verifier
         if isinstance(table, ProductOfExponentials):
             check_screws(verifier, table)
         else:
@@ -218,8 +217,7 @@ def _load_mjcf(
     listed = of_mjcf(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
     robot = robot_of(text, **how, listed=listed, made=True)
     if wanted:
-        plain = _is_plain(robot)
-        verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
+        verifier = _plain(robot, text, listed=listed, made=True).verifier
         robot.verifier.reading = check_mjcf_source(verifier, read)
     return robot
 
@@ -264,10 +262,11 @@ def _load_usd(
     return robot
 
 
-def _is_plain(robot: Robot) -> bool:
-    """Return whether the robot has no added root joint, no locked joint and all of its mimic rules."""
+def _plain(robot: Robot, text: Text, **options: Any) -> Robot:
+    """Return the robot of a text without a root joint, without locks and with all of its mimic rules."""
     origin = robot.origin
-    return origin.mimic is not False and origin.root_joint is None and not origin.lock
+    plain = origin.mimic is not False and origin.root_joint is None and not origin.lock
+    return robot if plain else robot_of(text, **options)
 
 
 def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
@@ -290,8 +289,7 @@ def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unp
     text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
     robot = robot_of(text, **how, made=True)
     if checked_choice(how["verify"]):
-        plain = _is_plain(robot)
-        verifier = (robot if plain else robot_of(text, made=True)).verifier
+        verifier = _plain(robot, text, made=True).verifier
         robot.verifier.reading = check_model_source(verifier, read, source)
     return robot
 

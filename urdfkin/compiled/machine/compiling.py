@@ -281,14 +281,6 @@ class Core(Kernel):
         return int(self.compiled.ctypes(*arguments))
 
 
-def core(function: Callable[..., int]) -> Core:
-    """Return a compiled version of a function whose arguments are integers, for example memory addresses.
-
-    The function is compiled at the first call and cached on disk.
-    """
-    return Core(function)
-
-
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator for a function that is a part of kernels, with additional options for Numba."""
     return jitted(**_PART, **options)

@@ -13,7 +13,7 @@ from typing import Any
 
 from urdfkin.compiled import axes, outputs, recursion, recursions
 from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
-from urdfkin.compiled.machine.compiling import Core, compiled, core
+from urdfkin.compiled.machine.compiling import Core, compiled
 from urdfkin.kinematics.arithmetic import rebound
 
 #: The number types and memory functions for Numba, which replace those for Python.
@@ -21,7 +21,7 @@ _OTHERS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}
 _PARTS: dict[str, Any] = rebound(axes, recursion, outputs, made=compiled, others=_OTHERS)
-_MADE: dict[str, Core] = rebound(recursions, made=core, others=_PARTS)
+_MADE: dict[str, Core] = rebound(recursions, made=Core, others=_PARTS)
 
 placements, velocities, accelerations = (
     _MADE[name] for name in ("placements", "velocities", "accelerations")

@@ -25,7 +25,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from urdfkin.compiled.machine import kernels
-from urdfkin.compiled.machine.compiling import Core, compiled, core
+from urdfkin.compiled.machine.compiling import Core, compiled
 from urdfkin.compiled.machine.memory import WHOLE_NUMBERS, whole_numbers_at
 from urdfkin.compiled.plan import REFERENCES, CompiledTree, IntArray, KernelArgs, program_of, scratch
 from urdfkin.model.reference import Reference
@@ -107,7 +107,7 @@ def _doubles_address(given, ndarray, flags, axes, rows, columns):
     return x[_DATA] if alike else 0
 
 
-@core
+@Core
 def one_configuration(bound, arguments, count):
     """Compute the result for one configuration.
 

@@ -92,7 +92,10 @@ class Misprint:
 
 @cache
 def sections() -> tuple[Section, ...]:
-    return tuple(_section(_read(name)) for name in _FILES)
+    return tuple(
+        Section(data["section"], data["title"], tuple(_equation(data | entry) for entry in data["equation"]))
+        for data in map(_read, _FILES)
+    )
 
 
 @cache
@@ -108,15 +111,6 @@ def misprints() -> tuple[Misprint, ...]:
 
 def _read(name: str) -> dict[str, Any]:
     return tomllib.loads((Path(__file__).with_name("data") / f"{name}.toml").read_text(encoding="utf-8"))
-
-
-def _section(data: dict[str, Any]) -> Section:
-    entries = tuple(_equation({**_defaults(data), **entry}) for entry in data["equation"])
-    return Section(data["section"], data["title"], entries)
-
-
-def _defaults(data: dict[str, Any]) -> dict[str, Any]:
-    return {"test_file": data["test_file"], "against": data["against"]}
 
 
 def _equation(entry: dict[str, Any]) -> Equation:
@@ -142,7 +136,11 @@ def table() -> str:
             "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
             + "\n".join(_row(equation) for equation in section.equations),
         ]
-    parts += ["## Misprints", _misprint_head(), *(_misprint(misprint) for misprint in misprints())]
+    parts += [
+        "## Misprints",
+        "Wrong or incomplete statements in the chapter. A test proves each one.",
+        *map(_misprint, misprints()),
+    ]
     return "\n\n".join(parts) + "\n"
 
 
@@ -182,10 +180,6 @@ def _row(equation: Equation) -> str:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
-
-
-def _misprint_head() -> str:
-    return "Wrong or incomplete statements in the chapter. A test proves each one."
 
 
 def _misprint(misprint: Misprint) -> str:
@@ -240,16 +234,3 @@ def _page(equation: Equation) -> str:
 def _source(name: str) -> list[str]:
     source = textwrap.indent(inspect.getsource(getattr(chapter, name)).rstrip(), "    ")
     return ["code in urdfkin/kinematics/equations.py, and LaTeX", "", source]
-
-
-__all__ = [
-    "LOST",
-    "Equation",
-    "Misprint",
-    "Section",
-    "equations",
-    "explain",
-    "misprints",
-    "sections",
-    "table",
-]

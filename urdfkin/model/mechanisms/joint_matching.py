@@ -26,6 +26,7 @@ import numpy as np
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.mechanisms.mechanism import (
     ALONG,
+    IDENTITY,
     Edge,
     Mechanism,
     Screw,
@@ -134,11 +135,10 @@ class Pairing:
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
         """Return whether each joint axis at a body of A coincides with an axis of B that is moved by X."""
-        at = np.eye(4)
         return all(
             any(
                 family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
-                and self._tolerance.holds(*self.mismatch(e, f, at, X))
+                and self._tolerance.holds(*self.mismatch(e, f, IDENTITY, X))
                 for f in self.b.edges_of[bodies[1]]
             )
             for e in self.a.edges_of[bodies[0]]
@@ -151,7 +151,7 @@ class Pairing:
         Joints that the user matched with `--map` are omitted. The motion X (4, 4) moves B from its zero
         configuration to the pose of A.
         """
-        one = self._geometries(self.a, bodies[0], [e], np.eye(4))
+        one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
         ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []
         return [edges[j] for _, j in ranked]
@@ -368,7 +368,8 @@ def root_poses_by_siblings(
         return
     first = turning[0]
     u = ours[first].screw
-    rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -_across(u, ours[i].screw))
+    sines = [float(np.linalg.norm(np.cross(u.direction, axis.screw.direction))) for axis in ours]
+    rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -sines[i])
     second, others = rest[0], [i for i in rest[1:] if ours[i].turns][:1]
     theirs = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
     for f, axis in theirs[first]:
@@ -401,11 +402,6 @@ def _seen_from(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
 
 def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
     return [edge for edge in mechanism.edges_of[body] if mechanism.joint(edge).kind.has_axis]
-
-
-def _across(u: Screw, s: Screw) -> float:
-    """Return the sine of the angle between the directions of two axes."""
-    return float(np.linalg.norm(np.cross(u.direction, s.direction)))
 
 
 def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
@@ -459,8 +455,6 @@ Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 DEEPEST = 200
 #: Largest number of joint pairs that the search for exact matches tries at two bodies.
 MOST_ASSIGNMENTS = 5000
-
-IDENTITY = np.eye(4)
 
 #: For each coordinate of A, the name of B's corresponding coordinate, and the ratio of their velocities.
 #: The ratio is B's velocity divided by A's; a negative ratio means opposite directions.

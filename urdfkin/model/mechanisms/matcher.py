@@ -155,14 +155,17 @@ class MechanismMatcher:
         """
         if self.gauge is not None:
             names = self.gauge.base
-            base = next(self._bases()) if names is None else self._bodies_of(*names)
+            base = next(self._bases())
+            if names is not None:
+                links = self.a.tree.link_index(names[0]), self.b.tree.link_index(names[1])
+                base = self.a.body_of[links[0]], self.b.body_of[links[1]]
             X = self.gauge.X
             yield base, IDENTITY if self.tolerance.holds(*apart(IDENTITY, X)) else X
             return
         bases = list(self._bases())
         if self.exact is not None:
             exact = self._exact_beginning(bases)
-            if exact is None and self._mimics():
+            if exact is None and any(joint.mimic for m in (self.a, self.b) for joint in m.tree.joints):
                 self.exact.ignore_rules()
                 exact = self._exact_beginning(bases)
             if exact is not None:
@@ -198,9 +201,6 @@ class MechanismMatcher:
             most += sum(map(min, *sizes))
         return most
 
-    def _mimics(self) -> bool:
-        return any(joint.mimic is not None for m in (self.a, self.b) for joint in m.tree.joints)
-
     def _exact_beginning(self, bases: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], FloatArray] | None:
         """Return two bodies and a pose of B's root for which all of A matches all of B exactly, or None."""
         for base in bases:
@@ -231,10 +231,6 @@ class MechanismMatcher:
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
-
-    def _bodies_of(self, link_a: str, link_b: str) -> tuple[int, int]:
-        a, b = self.a, self.b
-        return a.body_of[a.tree.link_index(link_a)], b.body_of[b.tree.link_index(link_b)]
 
     def _bases(self) -> Iterator[tuple[int, int]]:
         """Yield pairs of bodies (one of A and one of B) at which the matcher may start.
@@ -480,7 +476,8 @@ class MechanismMatcher:
         if self.tolerance.holds(tilt, shift):
             exact = self._exact_pose(place, there)
             if exact is not None:
-                zero = _value_of(t, inverse(place.XC) @ exact, turns=turns)
+                T = inverse(place.XC) @ exact
+                zero = turn_about(t.direction, T[:3, :3]) if turns else float(t.direction @ T[:3, 3])
                 zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
@@ -609,13 +606,6 @@ def better(score: Score, than: Score) -> bool:
     largest difference is less than half of the largest difference of `than`.
     """
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
-
-
-def _value_of(screw: Screw, T: FloatArray, *, turns: bool) -> float:
-    """Return the joint value (rad or m) for which the motion about this screw is the rigid motion T."""
-    if turns:
-        return turn_about(screw.direction, T[:3, :3])
-    return float(screw.direction @ T[:3, 3])
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:
