@@ -209,11 +209,8 @@ def _lists(
     task: list[Any] = [0] * len(KernelArgs)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.lists
     task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = [None] * program.rows, result
-    task[KernelArgs.REFERENCE], task[KernelArgs.N], task[KernelArgs.WIDTH] = (
-        REFERENCES[reference],
-        1,
-        len(result),
-    )
+    task[KernelArgs.REFERENCE] = REFERENCES[reference]
+    task[KernelArgs.N], task[KernelArgs.WIDTH] = 1, len(result)
     for place, x in zip(_PLACES, inputs, strict=False):
         task[place] = x[0 if len(x) == 1 else i].tolist()
     if inputs[0] is STILL_STATE:

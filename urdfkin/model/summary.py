@@ -49,9 +49,6 @@ class Joints(dict[str, Joint], Displayable):
         super().__init__((joint.name, joint) for joint in tree.joints)
         self._tree = tree
 
-    def __str__(self) -> str:
-        return self._sheet().text()
-
     def _sheet(self) -> TextDocument:
         tree = self._tree
         columns = COLUMNS if any(joint.mimic for joint in self.values()) else COLUMNS[:-1]

@@ -231,9 +231,6 @@ class Lock:
     joint: Joint
     q: float
 
-    def __reduce__(self) -> tuple[type[Lock], tuple[Any, ...]]:
-        return type(self), (self.joint, self.q)
-
     @property
     def value(self) -> float:
         """The joint's own value, rad or m."""

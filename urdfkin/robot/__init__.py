@@ -775,11 +775,8 @@ class Robot(Displayable):
         >>> arm.placement([[0.0, 0.0], [0.1, 0.2]], ["link_2", "tip"]).shape
         (2, 2, 4, 4)
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, _ALIGNED, verify))
-            and (one := fast._placement(q, out)) is not None
-        ):
+        fast = self._fast(frame, _ALIGNED, base, verify, threads)
+        if fast and (one := fast._placement(q, out)) is not None:
             return one
         return self._computed("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
 
@@ -841,11 +838,8 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], {"joint_1": 1.0, "joint_2": 0.0}).round(6).tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, reference, verify))
-            and (one := fast._velocity(q, v, out)) is not None
-        ):
+        fast = self._fast(frame, reference, base, verify, threads)
+        if fast and (one := fast._velocity(q, v, out)) is not None:
             return one
         return self._computed("velocity", (q, v), frame, reference, base, out, verify, threads)
 
@@ -871,11 +865,8 @@ class Robot(Displayable):
         >>> J[:2].round(6).tolist()
         [[-0.4, -0.4], [0.5, 0.0]]
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, reference, verify))
-            and (one := fast._jacobian(q, out)) is not None
-        ):
+        fast = self._fast(frame, reference, base, verify, threads)
+        if fast and (one := fast._jacobian(q, out)) is not None:
             return one
         return self._computed("jacobian", (q,), frame, reference, base, out, verify, threads)
 
@@ -941,11 +932,8 @@ class Robot(Displayable):
         >>> H[0].tolist()  # x row, m/rad: the second derivatives of x = 0.5 cos q1 + 0.4 cos(q1 + q2)
         [[-0.9, -0.4], [-0.4, -0.4]]
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, reference, verify))
-            and (one := fast._hessian(q, out)) is not None
-        ):
+        fast = self._fast(frame, reference, base, verify, threads)
+        if fast and (one := fast._hessian(q, out)) is not None:
             return one
         return self._computed("hessian", (q,), frame, reference, base, out, verify, threads)
 
@@ -976,11 +964,8 @@ class Robot(Displayable):
         >>> arm.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0]).round(6).tolist()  # -w^2 r, r = 0.9 m
         [-0.9, 0.0, 0.0, 0.0, 0.0, 0.0]
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, reference, verify))
-            and (one := fast._acceleration(q, v, a, out)) is not None
-        ):
+        fast = self._fast(frame, reference, base, verify, threads)
+        if fast and (one := fast._acceleration(q, v, a, out)) is not None:
             return one
         return self._computed("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
 
@@ -1626,11 +1611,16 @@ class Robot(Displayable):
         return found[:, 0]
 
     def _fast(
-        self, frame: str | Sequence[str] | None, reference: Reference | str, verify: Verify | None
+        self,
+        frame: str | Sequence[str] | None,
+        reference: Reference | str,
+        base: BaseMotion | None,
+        verify: Verify | None,
+        threads: int | None,
     ) -> PreparedFrame | None:
         """Return the fast evaluator for a call; None if the call needs the general code."""
         wanted = self.verifier.policy if verify is None else verify
-        if wanted is not True and wanted is not False:
+        if base is not None or threads is not None or (wanted is not True and wanted is not False):
             return None
         if frame is None:
             frame = self._default_frame()

@@ -35,10 +35,8 @@ def sine_cosine(s, row, x):
         put(s, row, x)
         for k in range(row * LANES, (row + 1) * LANES):
             if not abs(s[k]) < LARGEST_ANGLE:
-                sine, cosine = (
-                    _with_lane(sine, k - row * LANES, math.sin(s[k])),
-                    _with_lane(cosine, k - row * LANES, math.cos(s[k])),
-                )
+                sine = _with_lane(sine, k - row * LANES, math.sin(s[k]))
+                cosine = _with_lane(cosine, k - row * LANES, math.cos(s[k]))
     return sine, cosine
 
 

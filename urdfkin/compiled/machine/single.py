@@ -31,15 +31,11 @@ from urdfkin.compiled.plan import REFERENCES, CompiledTree, IntArray, KernelArgs
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-_CORE, _BUSY, _COUNT = int(KernelArgs.CORE), int(KernelArgs.BUSY), int(KernelArgs.COUNT)
-_Q, _OUT, _NQ, _NV, _ORDERS = (
-    int(KernelArgs.Q),
-    int(KernelArgs.OUT),
-    int(KernelArgs.NQ),
-    int(KernelArgs.NV),
-    int(KernelArgs.ORDERS),
+_CORE, _BUSY, _COUNT = map(int, (KernelArgs.CORE, KernelArgs.BUSY, KernelArgs.COUNT))
+_Q, _OUT, _NQ, _NV = map(int, (KernelArgs.Q, KernelArgs.OUT, KernelArgs.NQ, KernelArgs.NV))
+_ORDERS, _AXES, _ROWS, _COLUMNS = map(
+    int, (KernelArgs.ORDERS, KernelArgs.AXES, KernelArgs.ROWS, KernelArgs.COLUMNS)
 )
-_AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelArgs.COLUMNS)
 
 #: Number of words (of eight bytes) in the header of a Python object.
 _OWN = object.__basicsize__ // 8
