@@ -1,12 +1,9 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs have the shapes (n, nq) and (n, nv); `urdfkin.robot` has checked and reshaped them. If all n
-configurations have the same input, this input is not copied n times. A few configurations are computed with
-Python numbers, and more configurations by a compiled kernel (`preload`). The kernel returns exactly the same
-doubles as the Python numbers.
-
-A large batch is computed with several threads. Each configuration is computed independently of the others, so
-the results are exactly the same for any number of threads.
+Inputs have the shapes (n, nq) and (n, nv); `urdfkin.robot` has checked and reshaped them. A few
+configurations are computed with Python numbers, and more configurations by a compiled kernel (`preload`) in
+several threads. The results are exactly the same doubles for each kind of computation and any number of
+threads.
 """
 
 from __future__ import annotations

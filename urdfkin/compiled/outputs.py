@@ -1,9 +1,8 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
 For each output (for example the velocity), a function `follow_...` selects the parts of a link's state that
-the output needs. A function `emit_...` writes the output of a frame. Velocities and accelerations are
-computed in the axes of their reference frame (`urdfkin.compiled.axes`). Jacobian columns are computed in
-world axes; for LOCAL they are rotated to the axes of the frame.
+the output needs. A function `emit_...` writes the output of a frame. Jacobian columns are computed in world
+axes; for LOCAL they are rotated to the axes of the frame.
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
 """Compute results of one frame for one configuration in fast calls, for control loops and solvers.
 
-The recursion is the same as for the methods of `Robot`. A kernel computes eight configurations at a time;
-here, all eight are the same configuration. Each function has its own program and its own scratch memory, so
-the caller passes only the arrays. If another thread is using the function, `Robot` computes the same result
-instead.
+Each function has its own program and its own scratch memory, so the caller passes only the arrays. If another
+thread is using the function, `Robot` computes the same result instead.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
 """Number types for one configuration, with which the recursion runs in Python without compilation.
 
-Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A
-product x y is not computed at once. In the sum x y + z, the product and the sum are one fused multiply-add,
-which is rounded only once. `zero()` and `one()` are the constants 0 and 1. `nothing()` stands for a number
-that is not needed. Every number computed from `nothing()` is also `nothing()`.
-
-Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel takes
-addresses.
+Results are exactly the same doubles as those of compiled kernels; `urdfkin.compiled.machine.numbers` explains
+the types. Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel
+takes addresses.
 """
 
 from __future__ import annotations

@@ -8,15 +8,9 @@ The state of a link consists of:
 | w, vel | angular velocity, velocity of the origin | world or link axes, as `axes` selects |
 | alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
-The recursion expresses vectors in the axes of the requested result: world axes or the link's own axes. A
-rotation of the result at the end would add rounding errors. The equations are in the module
-`urdfkin.kinematics.equations`. They have the same form in world axes and in a link's own axes.
-
-For example, a placement does not need velocities: an unused vector is `nothing()` and costs no time.
-
-This module and the modules `axes`, `outputs` and `recursions` contain plain functions that compute with the
-module `python_numbers`. The kernels are copies of these functions for Numba's number types
-(`urdfkin.compiled.machine.kernels`).
+A vector that a result does not need is `nothing()` and costs no time. This module and the modules `axes`,
+`outputs` and `recursions` contain plain functions that compute with the module `python_numbers`. The kernels
+are copies of these functions for Numba's number types (`urdfkin.compiled.machine.kernels`).
 """
 
 from __future__ import annotations

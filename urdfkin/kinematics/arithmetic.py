@@ -1,9 +1,7 @@
 """Copies of the equations that use different basic operations, for example for NumPy arrays or LaTeX.
 
-The functions of `urdfkin.kinematics.equations` compute with vectors that are triples of numbers. `bound`
-copies these functions and replaces their basic operations, such as `plus` and `cross`. With suitable
-operations, the copies compute with NumPy arrays, write LaTeX, or compute bounds on the lengths of vectors.
-This module does not import NumPy.
+The functions of `urdfkin.kinematics.equations` compute with vectors that are triples of numbers. Their copies
+compute with NumPy arrays, write LaTeX, or compute bounds. This module does not import NumPy.
 """
 
 from __future__ import annotations

@@ -1,11 +1,4 @@
-"""LaTeX text of the equations.
-
-The functions of `equations` are called with LaTeX expressions instead of numbers.
-
-A `Word` is a LaTeX expression. Its attribute `kind` says whether the expression is a sum, a cross product or
-neither. A sum needs brackets inside a product, and a cross product needs brackets inside another cross
-product.
-"""
+"""LaTeX text of the equations: the functions of `equations` take LaTeX expressions instead of numbers."""
 
 from __future__ import annotations
 
@@ -52,13 +45,15 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class Word:
-    """A LaTeX expression; `kind` is `_SUM`, `_CROSS`, or `_ATOM` for any other expression."""
+    """A LaTeX expression; `kind` is `_SUM`, `_CROSS`, or `_ATOM` for any other expression.
+
+    A sum needs brackets inside a product, and a cross product needs brackets inside another cross product.
+    """
 
     text: str
     kind: int = _ATOM
 
     def inside(self, kind: int) -> str:
-        """Return the text, in brackets if it is a sum, or if it is a cross product and `kind` is `_CROSS`."""
         return f"({self.text})" if self.kind >= kind else self.text
 
     def __neg__(self) -> Word:

@@ -1,7 +1,5 @@
 """The compiled recursions, one for each function of the module `recursions`.
 
-Each compiled function takes the address of its arguments.
-
 For a batch, a kernel computes eight configurations at a time, one in each of the eight lanes of a vector
 register. For a single configuration, the same kernel computes the same numbers in all eight lanes. A
 configuration therefore has exactly the same result in a batch as in a call with only this configuration.

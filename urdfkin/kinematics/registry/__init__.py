@@ -1,8 +1,7 @@
 """The textbook's equations as data: each has its statement, its meaning, its functions and its tests.
 
-The TOML files in `data` are the only source. This module generates `docs/equations.md` and the output of
-`urdfkin explain 7.130` from them. A test checks that every function and every test that these files name
-exists.
+The TOML files in `data` are the only source of `docs/equations.md` and of `urdfkin explain 7.130`. A test
+checks that every function and every test that these files name exists.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Convert q, v, a, Jacobians and six-vectors of one robot to another program's convention, and back.
 
-The target program can be any other program or library for robots. Let M be the matrix `Conversion.matrix`,
-and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v, and J_tool = S J M^-1. S exchanges the
-linear and the angular rows if the target program has the angular rows first. M is constant unless the target
-program and urdfkin use different axes for the velocity of a floating or planar joint.
+Let M be the matrix `Conversion.matrix`, and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v,
+and J_tool = S J M^-1. S exchanges the linear and the angular rows if the target program has the angular rows
+first. M is constant unless the target program and urdfkin use different axes for the velocity of a floating
+or planar joint.
 """
 
 from __future__ import annotations

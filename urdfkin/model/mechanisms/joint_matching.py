@@ -1,8 +1,7 @@
 """Find joints of two mechanisms that may correspond, and poses and zero offsets that align their axes.
 
-Joints at two matched bodies are paired in three ways: by the names that the user gives, by equal names, and
-by geometry. This module also proposes poses of a body, and zero offsets of a joint. `MechanismMatcher` tries
-each proposal.
+Joints at two matched bodies are paired by the names that the user gives, by equal names, or by geometry.
+`MechanismMatcher` tries each proposed pose and zero offset.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other. Each subtree begins after a joint. The angle of this joint does not matter, because it can be added

@@ -1,13 +1,9 @@
-"""Align mechanism B with mechanism A.
-
-An alignment pairs the joints of A with those of B. It also contains the body of B that corresponds to A's
-first body, the order of B's joints, and the sign and the zero offset of each joint. The code calls this sign
-the `sense` of the joint.
+"""Align mechanism B with mechanism A: pair their joints, and find the sign and zero offset of each joint.
 
 `MechanismMatcher` starts at a body of A and the corresponding body of B. From these bodies it goes through
-both trees, joint by joint. At each joint it chooses the sign and the zero offset for which most later links
-and axes of B coincide with links and axes of A. `align` calls the matcher for several first bodies and joint
-orders, and returns the best result.
+both trees, joint by joint. At each joint it chooses the sign (`sense`) and the zero offset for which most
+later links and axes of B coincide with links and axes of A. `align` calls the matcher for several first
+bodies and joint orders, and returns the best result.
 
 In most cases, the axes and link frames below a joint determine its zero offset. If no axes and no link frames
 are below the joint, only a mimic rule can determine the offset. Let v = m w + c be a mimic rule of A, and let
