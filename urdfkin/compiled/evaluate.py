@@ -314,7 +314,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
 
     The result is 1 if an input is nan, infinite or too large, else 0. All arrays are C-contiguous. `compute`
     must release Python's global interpreter lock. `threads` is the largest number of threads; None stands for
-    `default_threads`, and a number below 1 raises InputError.
+    `default_threads`, and anything but an integer of at least 1 raises InputError.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)

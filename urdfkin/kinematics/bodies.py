@@ -17,13 +17,14 @@ True for a rotary joint and False for a prismatic one; `rate` is the joint's vel
 
 There are two Jacobians; the textbook warns that they are often confused. The velocity Jacobian J_v (..., 6,
 n) gives the linear and the angular velocity. The manipulator (or analytical) Jacobian J gives the time
-derivatives of x = (position, orientation). The orientation is either three Euler angles in any sequence (the
-textbook uses "ZYZ") or a unit quaternion ("quaternion", scalar last), so J is (..., 6, n) or (..., 7, n).
+derivatives of x = (position, orientation). For three Euler angles in any sequence (the textbook uses "ZYZ"),
+J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), J is (..., 7, n).
 
-Every function that takes an `ArrayLike` raises InputError for a wrong shape, a value that is not finite, an
-axis that is not of unit length, or a matrix that is not a rotation. An unknown `representation` raises
-UnknownNameError. If Euler angles are `nearest` radians or less from their singularity, Omega cannot be
-inverted; the functions with this argument then raise RepresentationSingularityError with the distance.
+Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
+raise it for an axis that is not of unit length and for a matrix that is not a rotation. An unknown
+`representation` raises UnknownNameError. If Euler angles are `nearest` radians or less from their singularity,
+Omega cannot be inverted. The functions with the argument `nearest` then raise RepresentationSingularityError
+with the distance.
 """
 
 from __future__ import annotations

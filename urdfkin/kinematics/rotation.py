@@ -13,8 +13,8 @@
 Arguments and results have any leading batch shape: a vector is (..., 3), a matrix (..., 3, 3), a quaternion
 (..., 4), and an angle or a rate (...). Units are metres, radians and seconds. `R_0_1` is the orientation of
 frame 1 in frame 0, and `w_0_1` is the angular velocity of frame 1 relative to frame 0, expressed in frame 0.
-A function that takes an `ArrayLike` raises InputError for a wrong shape, a value that is not finite, a matrix
-that is not a rotation, or an axis or quaternion whose length is not 1.
+Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
+raise it for a matrix that is not a rotation, and for an axis or a quaternion whose length is not 1.
 
 A user's matrix often has only a few digits, so its columns are only approximately orthogonal. There are
 several ways to convert such a matrix to a rotation: over a quaternion, over Euler angles, or by Gram-Schmidt
