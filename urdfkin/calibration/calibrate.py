@@ -585,14 +585,11 @@ def read_poses(
             a unit.
         rest: (nq,) values of coordinates without a column; None: zeros.
     """
-    found = (
-        _archive(path, len(coordinates))
-        if path.suffix.lower() == ".npz"
-        else _table(
-            path, coordinates, needed, units or {}, np.zeros(len(coordinates)) if rest is None else rest
-        )
-    )
-    q, T = found
+    if path.suffix.lower() == ".npz":
+        q, T = _archive(path, len(coordinates))
+    else:
+        rest = np.zeros(len(coordinates)) if rest is None else rest
+        q, T = _table(path, coordinates, needed, units or {}, rest)
     T = T.copy()
     positions = T if T.ndim == 2 else T[:, :3, 3]
     positions *= UNITS[unit]

@@ -286,10 +286,8 @@ def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
             reason = (
                 f"q is shifted by {rows} relative to the poses; the correct q of each pose is {rows} {way}"
             )
-            if by > 0:
-                yield _Correction(reason, q[by:], 0, len(q) - by)
-            else:
-                yield _Correction(reason, q[:by], -by, None)
+            shifted = q[by:] if by > 0 else q[:by]
+            yield _Correction(reason, shifted, max(-by, 0), len(q) - max(by, 0))
     for j, name in enumerate(model.coupling.names):
         yield _Correction(_sign((name,)), q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0))
 
