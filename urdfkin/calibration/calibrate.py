@@ -62,7 +62,7 @@ _GENERAL = 40
 _UNLIKELY = 4.0
 #: A parameter is poorly observable if its ratio of uncertainties (`Calibration.weak`) exceeds this number.
 _WEAK = 10.0
-#: Seed of the random configurations for `Calibration.weak`; `Calibration.general` has another seed.
+#: `Calibration.weak` uses this seed of random configurations; `Calibration.general` uses another seed.
 _OTHERS = 1
 #: In J = Q R, a diagonal entry of R of at most this fraction of the largest entry means dependent columns.
 _DEPENDENT = 1e-12
@@ -72,9 +72,9 @@ _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Pinocchio's result has more rounding errors: it computes the poses of base and tip separately.
 #: It also reads the origins from the written file.
 _READ_BACK = 4.0
-#: Number of parameters or poses that a warning names.
+#: A warning names this number of parameters or poses.
 _NAMED = 6
-#: Text of the error if a fit is refused and no common mistake in the data explains it.
+#: The error has this text if no common mistake in the data explains a refused fit.
 _NO_REASON = (
     "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
 )
@@ -554,7 +554,7 @@ def _doubts(found: Calibration) -> Iterator[str]:
         )
 
 
-#: Largest error of a rotation matrix or of a quaternion's length: a file contains rounded digits.
+#: A rotation matrix or a quaternion's length may have this error: a file contains rounded digits.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))

@@ -173,11 +173,11 @@ _ONE_OR_MORE = 0.5
 _FOLLOWED = 1e-9
 #: At most `_ESTIMATES` noises are estimated; a relative change of at most `_STAYS` ends the estimation.
 _ESTIMATES, _STAYS = 20, 1e-3
-#: Probability that an outlier is reported for a data set that has no outliers.
+#: An outlier is reported with this probability for a data set that has no outliers.
 WRONGLY = 0.01
 #: A parameter that changed by less than this number of standard deviations is not written.
 SIGMAS = 2.0
-#: Largest share of outliers among all poses.
+#: At most this share of all poses may be outliers.
 _MOST_ODD = 0.25
 
 
@@ -437,10 +437,10 @@ def quantile(share: float, freedom: int) -> float:
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Largest number of repetitions in which base and target are computed alternately.
+#: At most `_TURNS` repetitions compute base and target alternately.
 #: They end when the position of the target changes by at most the fraction `_FIXED_END`.
 _TURNS, _FIXED_END = 200, 1e-9
-#: Largest allowed spread of the measured positions, relative to the spread of the robot's tip positions.
+#: Measured positions may spread at most this number of times more than the robot's tip positions.
 #: With positions in millimetres by mistake, this ratio is about 1000.
 _FARTHER = 100.0
 

@@ -155,11 +155,11 @@ PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: The six parameters of an origin, in the order of multiplication.
+#: An origin has six parameters, in the order of multiplication.
 #: Each entry contains the name, whether the motion is a rotation, and the index of the coordinate axis.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order of preference among parameters with the same effect, for revolute (True) and prismatic joints.
+#: Parameters with the same effect have an order of preference, for revolute (True) and prismatic joints.
 #: The joint's zero comes first, then motions of its axis, then motions of its frame alone.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))

@@ -31,29 +31,29 @@ from urdfkin.calibration.parameters import Model, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
-#: Limits of the rms position error, as fractions of the reach.
+#: The limits of the rms position error are fractions of the reach.
 #: A fit with an error above `_MISSED` is refused.
 #: The comments of `_UNEXPLAINED` and `_HARDLY_BELOW` explain `_CLOSE_BY` and `_NO_BETTER`.
 #: Above `_SUSPECT`, urdfkin corrects each common mistake in the data and fits again.
 _MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
-#: Largest error of a fit, as a fraction of the spread of measured positions.
+#: This limit of a fit's error is a fraction of the spread of measured positions.
 #: A fit with a larger error is refused if the error also exceeds `_CLOSE_BY` times the reach.
 _UNEXPLAINED = 0.25
-#: Largest error of a fit, as a fraction of the error before the fit.
+#: This limit of a fit's error is a fraction of the error before the fit.
 #: A fit with a larger error is refused if the error also exceeds `_NO_BETTER` times the reach.
 _HARDLY_BELOW = 0.7
-#: Limits of the rms orientation error, radians.
+#: The limits of the rms orientation error are in radians.
 #: A fit with an error above `_MISTURNED` is refused.
 #: Above `_SUSPECT_TURN`, urdfkin corrects each common mistake in the data and fits again.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
-#: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
+#: These are the largest plausible tilt of a joint's axis (rad) and the largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
 #: Two configurations are treated as one if their joint values (rad, m) differ by less than this number.
 _ONE_CONFIGURATION = 1e-6
 #: urdfkin subtracts this number of standard deviations from a change, and compares the rest with the limit.
 #: The reason is that the tilt of an axis near the target is poorly observable.
 _UNCERTAIN = 5.0
-#: Largest error after a correction, as a fraction of the error before the correction.
+#: The limit of the error after a correction is a fraction of the error before the correction.
 #: The limit is `_BETTER` for an accepted fit before the correction, and `_NOT_WORSE` for a refused one.
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: `_FITTED` is the number of corrections that are fitted; the most promising ones are fitted first.
@@ -342,7 +342,7 @@ class _Trial:
         )
         self.weights = Noise(1.0, 1.0 / reach)
         self.start = starting(model, self.measured)
-        #: Error (m) per pose when only base and tool are fitted.
+        #: This error (m) per pose is that of a fit of only base and tool.
         self.left_before = _size(errors(model, self.measured, self.start), reach) / math.sqrt(
             len(self.measured)
         )

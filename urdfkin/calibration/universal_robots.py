@@ -36,7 +36,7 @@ from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: The links in the calibration file from base to tip, each with its parent joint.
+#: Each link in the calibration file, from base to tip, has a parent joint.
 LINKS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",
@@ -50,12 +50,12 @@ ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
 #: The fit of the origins uses this number of configurations; its check uses as many others.
 _FITTED = 40
-#: Seeds of the random configurations for the fit of the origins, and for the check of this fit.
+#: The fit of the origins and its check use random configurations with these seeds.
 _FITTED_SEED, _CHECKED_SEED = 2, 3
-#: Largest allowed residual of the fit, in metres and in radians.
+#: The fit may have this residual at most, in metres and in radians.
 #: The numbers in the file have nine digits, and their rounding causes residuals of this size.
 _LEFT = 1e-8
-#: Number of configurations on which two calibrations are compared.
+#: Two calibrations are compared on this number of configurations.
 _COMPARED = 1000
 
 

@@ -47,7 +47,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 
 
-#: Number of samples of a batch that are displayed.
+#: This number of samples of a batch is displayed.
 _SHOWN = 2
 
 

@@ -288,11 +288,11 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
 #: Starting a thread takes about ten microseconds.
 _WORTH_THREADS = 4096
 
-#: Number of configurations that NumPy computes at a time.
+#: NumPy computes this number of configurations at a time.
 #: The intermediate results then fit into the processor's cache.
 PART = 2048
 
-#: A function (inputs, out) that computes the rows of `out` from the rows of the inputs.
+#: The function computes the rows of its argument `out` from the rows of its argument `inputs`.
 #: The function returns 1 if an input is nan, infinite or too large, else 0 (see `machine.memory.ordinary`).
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 

@@ -19,14 +19,14 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
-#: Lock for the import of Numba and for compilations.
+#: This lock protects the import of Numba and the compilations.
 #: A fork of the process waits for this lock, because the child could not finish an import or a compilation.
 #: Before a fork, Python acquires the locks in the reverse order of their creation.
 #: The import of Numba uses the lock of the module `logging`, so `compiling` must be created after that lock.
 #: The lock `compiling` exists before the import of Numba begins.
 compiling = lock_over_forks()
 
-#: A function that receives the events of compilations.
+#: A listener receives the events of compilations.
 #: When a compilation begins, the function is called with the kernel's name and None.
 #: When the kernel is ready, the function is called with the kernel's name and the duration in seconds.
 Listener = Callable[[str, float | None], None]

@@ -82,7 +82,7 @@ _MOTION = {
     JointKind.FLOATING: Motion.FLOATING,
 }
 
-#: The motions of a joint, for example two translations and a rotation for a planar joint.
+#: A planar joint, for example, has two translations and a rotation.
 #: A motion is the index of its axis in the joint's frame, and True for a rotation or False for a translation.
 _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
     Motion.TURN: ((2, True),),
@@ -348,12 +348,12 @@ class Head(IntEnum):
     BASE = 12  # first scratch row of the base's motion
 
 
-#: Number of doubles in a row of scratch memory: one double for each of eight configurations.
+#: A row of scratch memory has one double for each of eight configurations.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers in an instruction: operation, three operands, and the index of its constants.
+#: An instruction has an operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Number of integers for each joint angle: two scratch rows, and two integers about the mimic rule.
+#: Each joint angle has two scratch rows, and two integers about the mimic rule.
 #: The rows are those of the angle and of its sine.
 #: The third integer is the index of the mimic rule in the constants.
 #: The fourth integer is 1 if the joint is a mimic joint, else 0.
@@ -363,7 +363,7 @@ ANGLE_WIDTH = 4
 #: Other numbers begin at `FIRST_ROW`.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers for each Jacobian column of a Hessian.
+#: Each Jacobian column of a Hessian has this number of integers.
 #: They are the scratch row of the column, the index of its moving joint, and that of its velocity in v.
 #: The fourth integer is the scratch row in which derivatives of the column are summed.
 PAIR_WIDTH = 4
@@ -598,10 +598,10 @@ def _blocks(places: Sequence[int]) -> list[int]:
     return sorted({int(place) // 8 * 8 for place in places})
 
 
-#: Size of a cache line of the processor, bytes.
+#: A cache line of the processor has this number of bytes.
 #: If a vector is partly in one cache line and partly in the next, access to it takes twice as long.
 _LINE = 64
-#: The integers that represent the reference frames in a kernel; another reference frame raises a KeyError.
+#: A kernel represents the reference frames by these integers; another frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }

@@ -25,17 +25,17 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Limits (s) of the time for computations without a kernel.
+#: These limits (s) apply to the time of computations without a kernel.
 #: Above the first limit, Numba is imported and the kernel is read from disk.
 #: Above the second limit, this process compiles a kernel that is not on disk.
 LOADING, COMPILING = 0.3, 3.0
 #: After this many seconds of computing without a kernel, a second process compiles the kernel.
 BESIDE = 1.0
-#: Limit (s) that is used instead of `LOADING` after the first kernel is loaded.
+#: After the first kernel is loaded, this limit (s) is used instead of `LOADING`.
 _LOADING_MORE = 0.03
-#: Seconds that the fast function saves for each call with one configuration.
+#: The fast function saves this time (s) for each call with one configuration.
 _SAVED = 5e-5
-#: Seconds after which the cache folder is searched again for a kernel that it did not contain.
+#: After this time (s), the cache folder is searched again for a missing kernel.
 _AGAIN = 0.05
 
 #: Modules that contain the kernels.

@@ -21,7 +21,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
-#: A function of joint coordinates, which is called as f(q, out), f(q, v, out) or f(q, v, a, out).
+#: A fast function is called as f(q, out), f(q, v, out) or f(q, v, a, out).
 #: It returns the result, or None for arguments that it does not support.
 #: If it returns None, `Robot` computes the result or raises the error.
 Fast = Callable[..., FloatArray | None]

@@ -12,7 +12,7 @@ from typing import Any
 
 from urdfkin.kinematics import equations
 
-#: The basic operations on vectors. All other functions are composed of them.
+#: All other functions are composed of these basic operations on vectors.
 VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
 
 

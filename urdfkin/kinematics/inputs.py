@@ -14,11 +14,11 @@ from urdfkin.system.lazy_import import is_a
 
 FloatArray = NDArray[np.float64]
 
-#: Largest deviation of a unit vector's norm from 1.
+#: A unit vector's norm deviates from 1 by this number at most.
 #: A vector that is normalised in double precision deviates by 4e-16 at most.
 #: A vector with six typed digits deviates by more; a rotation about it would not be a rotation matrix.
 UNIT_TOLERANCE = 1e-12
-#: Largest deviation of R R^T from the identity for a rotation.
+#: For a rotation R, R R^T deviates from the identity by this number at most.
 #: Each entry of R has an error of 5e-10 at most if it is rounded to nine decimals.
 #: R R^T then deviates by at most 1e-9 times the sum of the absolute values of a row of R.
 #: This sum is at most sqrt(3).

@@ -9,7 +9,7 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bound
 
-#: The textbook's symbol for each parameter name of the functions in `equations`.
+#: The textbook has these symbols for the parameter names of the functions in `equations`.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",

@@ -11,7 +11,7 @@ NumPy arrays, Python numbers and the compiled copies (`urdfkin.verify.kernels`) 
 from urdfkin.kinematics.number_kinds import Length
 from urdfkin.kinematics.number_kinds import length_equations as eq
 
-#: The five bounds (p, w, vel, alpha, acc) of the module docstring.
+#: A state is the five bounds (p, w, vel, alpha, acc).
 State = tuple[Length, ...]
 _Z = 1.0  #: Length of a joint's axis.
 

@@ -41,7 +41,7 @@ array_equations = bound(
 FloatArray = NDArray[np.float64]
 
 
-#: The type of lengths: an array with a number for each configuration, or a float for a single configuration.
+#: A length is an array with a number for each configuration, or a float for a single configuration.
 Length = Any
 
 

@@ -196,7 +196,7 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     return total
 
 
-#: Largest accepted deviation of a quaternion's norm from 1.
+#: A quaternion's norm may deviate from 1 by this number at most.
 NORM_TOLERANCE = 1e-6
 
 
@@ -434,9 +434,9 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 _AXES = "xyz"
-#: All triples of axes in which neighbouring axes differ.
+#: Neighbouring axes differ in these triples.
 _TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
-#: Names of all sequences: twelve with axes that turn with the body, and twelve with fixed axes.
+#: Twelve sequences have axes that turn with the body, and twelve have fixed axes.
 SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
@@ -552,7 +552,7 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: Least allowed distance (rad) from the singularity; nearer, computed rates lose too many digits.
+#: Nearer than this distance (rad) to the singularity, computed rates lose too many digits.
 NEAREST = 1e-9
 
 

@@ -33,7 +33,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Smallest size (m) of a robot in a comparison, which avoids a division by 0 if all its frames coincide.
+#: A robot has at least this size (m) in a comparison, also if all its frames coincide.
 LEAST_SIZE = 1e-9
 
 

@@ -40,7 +40,7 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest bound of a range (rad or m). The same number replaces a missing limit.
+#: This number (rad or m) bounds a range and replaces a missing limit.
 WIDEST = 10.0
 
 
@@ -173,11 +173,11 @@ def _own_range(joint: Joint) -> tuple[float, float]:
     return (lower, upper) if lower <= upper else (upper, lower)
 
 
-#: Largest difference (rad or m) between a mimic joint's coordinate and its mimic rule in `from_pinocchio`.
+#: In `from_pinocchio`, a mimic joint may deviate from its rule by this number (rad or m).
 _MIMIC_TOLERANCE = 1e-9
 
 
-#: Suffix and unit of each number of a joint that has several numbers in q or v.
+#: Each number of a joint with several numbers in q or v has a suffix and a unit.
 _OF_Q = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
@@ -497,7 +497,7 @@ def _degrees(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Number of configurations of a batch in which `warn_of_degrees` looks for degrees.
+#: `warn_of_degrees` looks for degrees in this number of configurations of a batch.
 #: A few are enough, because a whole batch has the same unit.
 _LOOKED_AT = 16
 
@@ -680,7 +680,7 @@ def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
 
 
-#: Functions that draw random coordinates of a joint with several coordinates.
+#: These functions draw random coordinates of a joint with several coordinates.
 _SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
 
 

@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: The part of the array q, v or a from the first number of a joint to the end.
+#: This part of q, v or a begins with the first number of a joint.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)

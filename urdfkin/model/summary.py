@@ -13,7 +13,7 @@ from urdfkin.model.tree import Joint, KinematicTree
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
 #: Indices of the text columns; link and joint are columns 0 and 1.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
-#: Indices of the text columns, if the first columns are the joint, its parent link and its child link.
+#: The text columns have these indices if the first columns are joint, parent link and child link.
 _AFTER_JOINT = (1, 2, *(i + 1 for i in WORDS[2:]))
 
 

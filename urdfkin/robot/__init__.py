@@ -82,11 +82,11 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes. Pinocchio and MuJoCo have the same default.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations at which the usual rank of a Jacobian is computed.
+#: The usual rank of a Jacobian is computed at this number of random configurations.
 _GENERIC = 3
-#: Members for internal use, hidden from name completion.
+#: Name completion hides these members for internal use.
 _INSIDE = {"plan", "verifier"}
-#: Largest number of float64 values in an array: its number of bytes must fit in 63 bits.
+#: The number of bytes of an array must fit in 63 bits, which allows this number of float64 values.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 

@@ -110,9 +110,9 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
         )
 
 
-#: Smallest number of samples: a second difference needs three samples.
+#: A second difference needs three samples.
 _FEWEST = 3
-#: Names of the arrays in an .npz file that contain the fields of `BaseMotion`.
+#: These arrays of an .npz file contain the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
 #: A note tells the user if the rounding error of the times exceeds this fraction of the smallest time step.
 _TIME_ROUNDING = 1e-6

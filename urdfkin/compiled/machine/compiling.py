@@ -203,7 +203,7 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-#: Decorator for a function that is a part of kernels.
+#: It decorates a part of kernels.
 compiled = jitted(**_PART)
 
 # An input array may be read-only; Numba also accepts a writable array for this signature, without a copy.

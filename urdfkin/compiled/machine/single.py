@@ -37,11 +37,11 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
     int, (KernelArgs.ORDERS, KernelArgs.AXES, KernelArgs.ROWS, KernelArgs.COLUMNS)
 )
 
-#: Number of words (of eight bytes) in the header of a Python object.
+#: The header of a Python object has this number of 8-byte words.
 _OWN = object.__basicsize__ // 8
 #: `_TYPE` is the 8-byte word with an object's type, `_ITEMS` that with the first item of a tuple.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
-#: Indices of 8-byte words in a NumPy array (the C structure PyArrayObject_fields).
+#: These 8-byte words of a NumPy array follow the C structure PyArrayObject_fields.
 #: The number of axes and the flags are numbers of four bytes.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
 #: In the C structure PyArray_Descr (an element type), one word has the byte order and the type number.
@@ -198,7 +198,7 @@ def arrays_are_known() -> bool:
     )
 
 
-#: The quantity's kernel, its kernel for LOCAL, its number of inputs, and its number of axes of length nv.
+#: A quantity has a kernel, a kernel for LOCAL, a number of inputs, and a number of axes of length nv.
 #: The inputs are q, or q and v, or q, v and a.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),

@@ -144,7 +144,7 @@ def _built_in() -> dict[str, Convention]:
     }
 
 
-#: Names of the built-in conventions, in the order of tables; a test compares them with conventions.toml.
+#: Tables list the built-in conventions in this order; a test compares the names with conventions.toml.
 BUILT_IN = (
     "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaaclab3",
     "isaacgym", "newton", "newton-usd", "usd", "ros", "alphabetical",

@@ -25,7 +25,7 @@ from urdfkin.model.conventions.convention import Convention, JointRule, spelled
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import plain_xml
 
-#: Largest allowed difference (rad or m) of a mimic joint's given value from its mimic rule.
+#: A mimic joint's given value may differ from its mimic rule by this number (rad or m).
 _MIMIC_TOLERANCE = 1e-9
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 

@@ -263,7 +263,7 @@ def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
 
 
 _Some = TypeVar("_Some")
-#: Two objects of the same type: one of mechanism A and one of mechanism B.
+#: One object belongs to mechanism A, the other to mechanism B.
 Both = tuple[_Some, _Some]
 
 
@@ -449,13 +449,13 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
 #: The arguments are the two child bodies, the two joints, and the pose of the parent body in B.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Largest number of joints on a path for the search for exact matches, which is recursive.
+#: The recursive search for exact matches allows this number of joints on a path.
 #: A mechanism with a longer path is matched without this search.
 DEEPEST = 200
-#: Largest number of joint pairs that the search for exact matches tries at two bodies.
+#: The search for exact matches tries at most this number of joint pairs at two bodies.
 MOST_ASSIGNMENTS = 5000
 
-#: For each coordinate of A, the name of B's corresponding coordinate, and the ratio of their velocities.
+#: Each coordinate of A has the name of B's corresponding coordinate, and the ratio of their velocities.
 #: The ratio is B's velocity divided by A's; a negative ratio means opposite directions.
 Rates = Mapping[str, tuple[str, float]]
 

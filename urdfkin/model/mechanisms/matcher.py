@@ -54,18 +54,18 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
-#: Number of further joints that the matcher compares if the next axis agrees equally well for two choices.
+#: The matcher compares this number of further joints if two choices agree equally well.
 AHEAD = 6
-#: Largest number of poses of B's root that the search for an exact match tries.
+#: The search for an exact match tries at most this number of poses of B's root.
 #: In each of these poses, the axes at a body of B coincide with axes at a body of A.
 MOST_ROOT_POSES = 48
 #: Suppose that equally many links and axes agree for two choices.
 #: One choice is better if its largest difference is less than this fraction of the other's.
 TWICE_AS_WELL = 0.5
 
-#: The result for a joint: a zero offset (rad or m), or a pose for a planar or floating joint.
+#: The result for a joint is a zero offset (rad or m); for a planar or floating joint, it is a pose.
 _Free = TypeVar("_Free", float, FloatArray)
-#: The number of links and axes of A that agree with B, and the largest difference (m).
+#: A score is the number of links and axes of A that agree with B, and the largest difference (m).
 Score = tuple[int, float]
 
 
@@ -126,7 +126,7 @@ class MechanismMatcher:
         self.counts = _counts(a), _counts(b)
         #: The number of joints and links that agree in the best alignment so far.
         self.matched = 0
-        #: The search for exactly matching subtrees; None if the argument `gauge` prescribes the alignment.
+        #: It searches for exactly matching subtrees; None means that `gauge` prescribes the alignment.
         self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
@@ -633,14 +633,14 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
     return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
 
 
-#: Largest number of joint orders that are tried; five prismatic joints have 120 possible orders.
+#: At most this number of joint orders is tried; five prismatic joints have 120 possible orders.
 MOST_ORDERS = 120
-#: Largest number of joint pairs that one search compares ahead of the current joint, in some seconds.
+#: One search compares at most this number of joint pairs ahead of the current joint, in some seconds.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
 MOST_AHEAD = 2000
 #: Larger tolerances that are tried if A and B differ: rad, and distances divided by the robot's size.
 NEARLY = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: Largest number of tried exchanges of joint pairs: (a, d) and (c, b) instead of (a, b) and (c, d).
+#: At most this number of exchanges is tried: (a, d) and (c, b) instead of the pairs (a, b) and (c, d).
 #: Only joints with different names are exchanged.
 MOST_EXCHANGED = 12
 
@@ -759,7 +759,7 @@ def _best_alignment(
     return MechanismMatcher(a, b, pairing, gauge, ahead or Ahead(0), tolerance, base).best()
 
 
-#: Numbers of full turns that are added to the zero offset of a revolute joint with a mimic rule.
+#: These full turns are added to the zero offset of a revolute joint with a mimic rule.
 TURNS = (0, 1, -1)
 #: The tolerance of a zero offset is the angle tolerance times this factor.
 #: The factor is large, because an offset computed from the positions of two close axes is inexact.

@@ -51,7 +51,7 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi
-#: Number of corners of a regular polygon that contains a circle.
+#: A regular polygon with this number of corners contains a circle.
 #: The polygon's corners are 0.1 % farther from the centre than the circle.
 _AROUND = 64
 
@@ -205,7 +205,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 
 #: `COARSE` is for the bounds of many frames; `FINE` gives a smaller bound, but takes longer.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
-#: Largest number of sample values of a revolute joint's variable.
+#: A revolute joint's variable has at most this number of sample values.
 #: If the range needs more, the joint's angles in A and B are treated as independent.
 MOST_VALUES = 1024
 
