@@ -351,10 +351,9 @@ class Head(IntEnum):
 #: A row of scratch memory has one double for each of eight configurations.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: An instruction has an operation, three operands, and the index of its constants.
+#: An instruction has five integers: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Each joint angle has two scratch rows, and two integers about the mimic rule.
-#: The rows are those of the angle and of its sine.
+#: Each joint angle has four integers; the first two are the scratch rows of the angle and of its sine.
 #: The third integer is the index of the mimic rule in the constants.
 #: The fourth integer is 1 if the joint is a mimic joint, else 0.
 ANGLE_WIDTH = 4
@@ -363,8 +362,8 @@ ANGLE_WIDTH = 4
 #: Other numbers begin at `FIRST_ROW`.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Each Jacobian column of a Hessian has this number of integers.
-#: They are the scratch row of the column, the index of its moving joint, and that of its velocity in v.
+#: Each Jacobian column of a Hessian has four integers.
+#: The first three are the scratch row of the column, the index of its moving joint, and that of its velocity in v.
 #: The fourth integer is the scratch row in which derivatives of the column are summed.
 PAIR_WIDTH = 4
 

@@ -22,8 +22,8 @@ J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), J is (..., 
 
 Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
 raise it for an axis that is not of unit length and for a matrix that is not a rotation. An unknown
-`representation` raises UnknownNameError. Omega cannot be inverted near the singularity of Euler angles. If the
-distance is `nearest` radians or less, RepresentationSingularityError with this distance is raised.
+`representation` raises UnknownNameError. Near the singularity of Euler angles, Omega cannot be inverted. If
+the distance is `nearest` radians or less, RepresentationSingularityError with this distance is raised.
 """
 
 from __future__ import annotations
