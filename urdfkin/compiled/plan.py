@@ -363,7 +363,7 @@ ANGLE_WIDTH = 4
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
 #: Each Jacobian column of a Hessian has four integers.
-#: The first three are the scratch row of the column, the index of its moving joint, and that of its velocity in v.
+#: The first three are the scratch row of the column, its joint's index, and the index of its velocity in v.
 #: The fourth integer is the scratch row in which derivatives of the column are summed.
 PAIR_WIDTH = 4
 
