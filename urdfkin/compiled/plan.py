@@ -571,8 +571,7 @@ class _Writer:
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
             sources[:, plan.columns[c, Column.V]] = row + COLUMN_ROWS * c + np.arange(6)
-        found: list[int] = sources.ravel().tolist()
-        return found
+        return sources.ravel().tolist()
 
     def _pairs(self, f: int) -> list[int]:
         """Return the list of Jacobian columns from which the kernel computes a frame's Hessian.

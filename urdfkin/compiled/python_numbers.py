@@ -44,8 +44,7 @@ def _c_fma() -> Callable[[float, float, float], float]:
     """Return the fused multiply-add of the C library, which the Python interpreter has already loaded."""
     function = ctypes.PyDLL(None).fma
     function.restype, function.argtypes = ctypes.c_double, (ctypes.c_double,) * 3
-    result: Callable[[float, float, float], float] = function
-    return result
+    return function
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
@@ -183,10 +182,8 @@ class Known:
 def _double(x: Any) -> float:
     """Return a number, which must not be `nothing()`, as a float."""
     if type(x) is Product:
-        product: float = x.x * x.y
-        return product
-    double: float = x.x if type(x) is Number else float((x.value or 0) if type(x) is Known else x)
-    return double
+        return x.x * x.y
+    return x.x if type(x) is Number else float((x.value or 0) if type(x) is Known else x)
 
 
 _ZERO, _ONE, _NOTHING = Known(0), Known(1), Known(None)

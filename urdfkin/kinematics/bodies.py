@@ -248,8 +248,7 @@ def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
     >>> link_endpoint(np.pi / 2, 2.0).round(12)
     array([0., 2.])
     """
-    endpoint: FloatArray = scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
-    return endpoint
+    return scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
@@ -261,8 +260,7 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
     array([0., 6.])
     """
     speed = scalars(length, "length") * scalars(rate, "rate")
-    velocity: FloatArray = speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
-    return velocity
+    return speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
 
 
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
@@ -322,8 +320,7 @@ def analytical_jacobian(
     representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
     """Return J = C^-1 J_v, the manipulator Jacobian (7.122)."""
-    J: FloatArray = representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
-    return J
+    return representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
@@ -332,8 +329,7 @@ def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatA
     Unlike the inverse conversion, this conversion works for every orientation.
     """
     C = representation_matrix(representation, R)
-    J_v: FloatArray = C @ _rows(J, "J", C.shape[-1])
-    return J_v
+    return C @ _rows(J, "J", C.shape[-1])
 
 
 def pose_rates(

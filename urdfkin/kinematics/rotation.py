@@ -111,8 +111,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """
     M = rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
-    nearest: FloatArray = M - M @ (0.5 * defect)
-    return nearest
+    return M - M @ (0.5 * defect)
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
@@ -278,8 +277,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
     q, q0 = quat[..., :3], quat[..., 3]
     turn = -skew(q) if frame == "fixed" else skew(q)
     top = turn + q0[..., np.newaxis, np.newaxis] * np.eye(3)
-    E: FloatArray = 0.5 * np.concatenate((top, -q[..., np.newaxis, :]), axis=-2)
-    return E
+    return 0.5 * np.concatenate((top, -q[..., np.newaxis, :]), axis=-2)
 
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
@@ -300,8 +298,7 @@ def angular_velocity_from_quaternion_rates(
     the quaternion's length.
     """
     E = quaternion_rate_matrix(quat, frame)
-    w: FloatArray = 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
-    return w
+    return 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
 
 
 def integrate_orientation(
@@ -378,8 +375,7 @@ def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
 
 def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
     """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34)."""
-    w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
-    return w
+    return scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
@@ -416,8 +412,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
     small = sine < 1e-150  # Here phi is twice this sine; the quotient would lose digits.
-    log: FloatArray = np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
-    return log
+    return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
 
 def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -625,8 +620,7 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
     """
     middle = vectors(angles, "angles")[..., 1]
     sine, cosine = np.abs(np.sin(middle)), np.abs(np.cos(middle))
-    distance: FloatArray = np.arctan2(sine, cosine) if sequence(name).proper else np.arctan2(cosine, sine)
-    return distance
+    return np.arctan2(sine, cosine) if sequence(name).proper else np.arctan2(cosine, sine)
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
@@ -640,8 +634,7 @@ def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)
-    condition: FloatArray = 1.0 / np.tan(singularity_distance(name, angles) / 2.0)
-    return condition
+    return 1.0 / np.tan(singularity_distance(name, angles) / 2.0)
 
 
 def _refuse_singular(name: str, angles: FloatArray, nearest: float) -> None:

@@ -430,8 +430,7 @@ def _columns(path: Path, data: Mapping[str, FloatArray], names: Sequence[str]) -
 
 
 def _gradient(x: FloatArray, t: FloatArray) -> FloatArray:
-    slopes: FloatArray = np.gradient(x, t, axis=0, edge_order=2)
-    return slopes
+    return np.gradient(x, t, axis=0, edge_order=2)
 
 
 def read_columns(

@@ -812,8 +812,7 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
 
 
 def _times(B: FloatArray, x: FloatArray) -> FloatArray:
-    found: FloatArray = (B @ x[..., np.newaxis])[..., 0]
-    return found
+    return (B @ x[..., np.newaxis])[..., 0]
 
 
 def _inverse(B: FloatArray) -> FloatArray:
