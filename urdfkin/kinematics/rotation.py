@@ -588,9 +588,9 @@ def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEA
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return the matrix Omega^-1, computed from the geometry of the axes and not by elimination (7.56).
 
-    In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
-    axis has no component along the second axis. One component of w then gives the third rate, and the other
-    two components give the first and the second rate. The errors are those of `euler_rates`.
+    In the frame after the first rotation, the first and the second axis are coordinate axes. The third axis
+    has no component along the second axis. One component of w then gives the third rate, and the other two
+    components give the first and the second rate. The errors are those of `euler_rates`.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)

@@ -286,8 +286,8 @@ def of_rows(rows: int) -> float:
 def of_rows_read_back(rows: int) -> float:
     """Return the number of roundings in a comparison of a table with the URDF that was written from it.
 
-    The number is `4 * of_rows(rows)`: `of_rows(rows)` for the pose from the table, the same for Pinocchio's
-    pose from the URDF, and twice as much for the conversion to roll, pitch and yaw.
+    The pose from the table has `of_rows(rows)`, and so has Pinocchio's pose from the URDF. The conversion to
+    roll, pitch and yaw has twice as many.
     """
     return 4.0 * of_rows(rows)
 

@@ -486,8 +486,8 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 def _degrees(joint: Joint, value: float) -> str:
     """Return a hint to write the unit `deg` if the value looks like degrees, else an empty text.
 
-    A value of a revolute joint looks like degrees if it is beyond `LARGEST_ANGLE` and far outside the limits,
-    but would be within the limits if it were converted from degrees to radians.
+    Only a value of a revolute joint beyond `LARGEST_ANGLE` and far outside the limits looks like degrees.
+    After a conversion to radians, it must be within the limits.
     """
     if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
         return ""

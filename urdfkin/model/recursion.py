@@ -195,8 +195,8 @@ class Recursion:
     ) -> Iterator[tuple[int, int, Number, Six]]:
         """Yield the derivative of each Jacobian column with respect to each joint coordinate.
 
-        Each tuple contains the column's index, the coordinate's index in v, a factor from the mimic rules,
-        and the derivative, which must be multiplied by this factor.
+        Each tuple contains the column's index, the coordinate's index in v, a factor, and the derivative. The
+        derivative must be multiplied by the factor, which comes from mimic rules.
         """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]

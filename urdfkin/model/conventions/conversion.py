@@ -775,8 +775,8 @@ class Reordering:
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
     """Return the formula that converts "q" or "v" from convention `start` to convention `end`, or None.
 
-    There is no formula if one of the two conventions stores the cosine and the sine of an angle, or if the
-    two conventions express a base velocity in different frames.
+    There is no formula if one convention stores the cosine and the sine of an angle. There is also none if
+    the two conventions express a base velocity in different frames.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
