@@ -1,8 +1,8 @@
 """Align mechanism B with mechanism A: pair their joints, and find the sign and zero offset of each joint.
 
 `MechanismMatcher` starts at a body of A and the corresponding body of B. From these bodies it goes through
-both trees, joint by joint. At each joint it chooses a sign (`sense`) and a zero offset. With this choice, most
-later links and axes of B coincide with those of A. `align` calls the matcher for several first
+both trees, joint by joint. At each joint it chooses a sign (`sense`) and a zero offset. With this
+choice, most later links and axes of B coincide with those of A. `align` calls the matcher for several first
 bodies and joint orders, and returns the best result.
 
 In most cases, the axes and link frames below a joint determine its zero offset. If no axes and no link frames
