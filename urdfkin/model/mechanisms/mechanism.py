@@ -730,7 +730,7 @@ class _Maker:
     def __init__(self, found: Alignment, tolerance: Tolerance) -> None:
         self.found, self.tolerance = found, tolerance
         self.trees = found.a.tree, found.b.tree
-        self.step_of_b = {step.b: i for i, step in enumerate(found.steps)}
+        self.step_of_b = {step.b: step for step in found.steps}
         self.leaders = self._leaders()
         self.deepest = found.deepest
 
@@ -745,7 +745,7 @@ class _Maker:
         for i in followers_last:
             name = tree.joints[i].name
             lines[name] = Line(f"b:{name}", 1.0, 0.0)
-            step = self._step(i)
+            step = self.step_of_b.get(i)
             if step is None or step.unlike:
                 continue
             value = self._a(step)
@@ -754,12 +754,8 @@ class _Maker:
                 lines[name] = value.moved(step.sense, step.offset)
         return lines
 
-    def _step(self, joint_b: int) -> Step | None:
-        at = self.step_of_b.get(joint_b)
-        return None if at is None else self.found.steps[at]
-
     def _follows_in_a(self, joint_b: int) -> bool:
-        step = self._step(joint_b)
+        step = self.step_of_b.get(joint_b)
         return step is not None and self.trees[0].joints[step.a].mimic is not None
 
     def _a(self, step: Step) -> Line:
