@@ -14,7 +14,7 @@ placement --format csv` writes it. An .npz file contains q (n, nq) and the poses
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +30,7 @@ from urdfkin.calibration.fit import (
     Noise,
     best_fit,
     demand_plausible,
+    first_names,
     identify,
     odd_poses,
     quantile,
@@ -45,7 +46,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_choice, as_names, as_str, real_number, safe_repr
 from urdfkin.kinematics.inputs import rotation_defect, scalars
-from urdfkin.kinematics.rotation import rotation_of
+from urdfkin.kinematics.rotation import polar_factor, rotation_of
 from urdfkin.model.configuration import checked
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -57,26 +58,23 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general`.
 _GENERAL = 40
-#: If the residuals differ from the stated noise by more than this number of standard deviations, a warning is
-#: shown.
+#: A warning is shown if the residuals differ from the stated noise by more standard deviations than this.
 _UNLIKELY = 4.0
 #: A parameter is poorly observable if its ratio of uncertainties (`Calibration.weak`) exceeds this number.
 _WEAK = 10.0
-#: Seed of the random configurations for `Calibration.weak`.
-#: The random configurations for `Calibration.general` have another seed.
+#: `Calibration.weak` uses this seed of random configurations; `Calibration.general` uses another seed.
 _OTHERS = 1
-#: In the QR decomposition J = Q R of the Jacobian J, a diagonal entry of R may be very small. If it is at
-#: most this fraction of the largest entry of R, the columns of J are treated as linearly dependent.
+#: In J = Q R, a diagonal entry of R of at most this fraction of the largest entry means dependent columns.
 _DEPENDENT = 1e-12
 #: The robot's size divided by these numbers gives the coordinates of a target that lies on no joint axis.
 _ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: `ParametricChain.rounding` is multiplied by this factor for the comparison with Pinocchio. Pinocchio's
-#: result has more rounding errors. Pinocchio computes the poses of base and tip separately. It reads the
-#: origins from the written file.
+#: `ParametricChain.rounding` is multiplied by this factor for the comparison with Pinocchio.
+#: Pinocchio's result has more rounding errors: it computes the poses of base and tip separately.
+#: It also reads the origins from the written file.
 _READ_BACK = 4.0
-#: Number of parameters or poses that a warning names.
+#: A warning names this number of parameters or poses.
 _NAMED = 6
-#: Text of the error if a fit is refused and no common mistake in the data explains it.
+#: The error has this text if no common mistake in the data explains a refused fit.
 _NO_REASON = (
     "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
 )
@@ -123,7 +121,6 @@ class Calibration:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters of the model."""
         return self.model.way.parameters
 
     @cached_property
@@ -142,7 +139,6 @@ class Calibration:
 
     @property
     def written_parameters(self) -> tuple[int, ...]:
-        """Indices of the parameters that are written."""
         return tuple(k for k in self.significant if k in self.writable)
 
     @cached_property
@@ -188,8 +184,7 @@ class Calibration:
 class ImplausibleError(InputError):
     """Error for a fit that is not plausible: the measured data or the model contain a gross mistake.
 
-    Attributes:
-        calibration: The refused calibration.
+    The attribute `calibration` is the refused calibration.
     """
 
     def __init__(self, calibration: Calibration, remedy: str) -> None:
@@ -297,19 +292,7 @@ def fitted_model(
 ) -> Calibration:
     """Fit as `calibrate` does, but also return fits that are not plausible.
 
-    Args:
-        source: As for `calibrate`.
-        q: As for `calibrate`.
-        poses: As for `calibrate`.
-        tip: As for `calibrate`.
-        base: As for `calibrate`.
-        fit: As for `calibrate`.
-        noise: As for `calibrate`.
-        drop_odd: As for `calibrate`.
-        complete: As for `calibrate`.
-        radians: As for `calibrate`.
-        every: As for `calibrate`.
-        judged: Whether to check that the fit is plausible.
+    If `judged` is False, the plausibility is not checked.
     """
     robot = source if isinstance(source, Robot) else load(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
@@ -344,10 +327,7 @@ def fitted_model(
 
 
 def _general_target(model: Model) -> FloatArray:
-    """Return the model's parameters (p,).
-
-    If the target's position is fitted, it is set to a point on no joint axis.
-    """
+    """Return the model's parameters (p,), with a fitted target position that is on no joint axis."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -424,7 +404,7 @@ def _fit(
 
 
 def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    """Return the parameters to write, which always include base and tool, and the fit of these parameters."""
+    """Return the parameters to write, which always include base and tool, and their fit."""
     kept, found = ended.identification.kept, ended.fitted
     fixed = [model.way.parameters[k].end for k in kept]
     moved = found.at[list(kept)] - model.way.start[list(kept)]
@@ -476,10 +456,7 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Return the poorly observable parameters, each with a ratio of uncertainties.
-
-    The ratio is explained at `Calibration.weak`.
-    """
+    """Return the poorly observable parameters, each with the ratio that `Calibration.weak` explains."""
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
     sizes = []
     for values in (measured.values, general):
@@ -504,7 +481,7 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
     at = fitted.at.copy()
     at[[p.end or p.what == "gain" for p in found.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # `load` already gave these warnings
+        warnings.simplefilter("ignore")  # `load` already gave these warnings.
         if (table := found.table) is not None:
             made = load(table)
             made.placement(made.neutral(), made.tip_frame)
@@ -537,13 +514,13 @@ def _doubts(found: Calibration) -> Iterator[str]:
         others = [k for k in found.general.kept if k not in found.identification.kept]
         yield (
             f"{found.identification.rank} parameters are identifiable from these poses; more varied poses "
-            f"would identify {lost} more: {_list(name[k] for k in others)}"
+            f"would identify {lost} more: {first_names((name[k] for k in others), _NAMED)}"
         )
     if found.weak:
         worst = sorted(found.weak.items(), key=lambda one: -one[1])
         yield (
             "poorly observable: "
-            + _list(f"{name[k]} ({ratio:.0f} times the usual uncertainty)" for k, ratio in worst)
+            + first_names((f"{name[k]} ({x:.0f} times the usual uncertainty)" for k, x in worst), _NAMED)
             + "; the usual uncertainty is that of the same number of random configurations"
         )
     if not fitted.is_judged:
@@ -560,7 +537,7 @@ def _doubts(found: Calibration) -> Iterator[str]:
         )
     if found.odd and found.without_odd is not None:
         one = len(found.odd) == 1
-        poses = f"pose{'' if one else 's'} {_list(map(str, found.odd))} "
+        poses = f"pose{'' if one else 's'} {first_names(map(str, found.odd), _NAMED)} "
         if len(fitted.errors) == len(found.without_odd.errors):
             yield poses + f"{'is' if one else 'are'} excluded as {'an outlier' if one else 'outliers'}"
         else:
@@ -572,17 +549,12 @@ def _doubts(found: Calibration) -> Iterator[str]:
     gains = [k for k in found.identification.kept if found.parameters[k].what == "gain"]
     if gains:
         yield (
-            f"these gains are not written, because a URDF cannot store them: {_list(name[k] for k in gains)}"
+            "these gains are not written, because a URDF cannot store them: "
+            + first_names((name[k] for k in gains), _NAMED)
         )
 
 
-def _list(names: Iterable[str]) -> str:
-    every = list(names)
-    return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")
-
-
-#: A rotation matrix, or the length of a quaternion, may have this error, because a file contains rounded
-#: digits.
+#: A rotation matrix or a quaternion's length may have this error: a file contains rounded digits.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
@@ -601,27 +573,23 @@ def read_poses(
 ) -> tuple[FloatArray, FloatArray]:
     """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3) in metres, from a file.
 
+    A file with the suffix .npz is read as such, any other file as CSV. A file that cannot be read raises
+    SourceError, and wrong content InputError.
+
     Args:
-        path: The file. It is read as .npz if it has this suffix, else as CSV.
+        path: The file.
         coordinates: Names of the coordinates of q.
         needed: Names of the required columns.
         unit: Unit of the positions: "m" or "mm".
         units: Unit of each coordinate, from `column_units`; the heading of a coordinate's column may end with
             a unit.
         rest: (nq,) values of coordinates without a column; None: zeros.
-
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: a column or array is missing or unknown, a number is invalid, or an orientation is wrong.
     """
-    found = (
-        _archive(path, len(coordinates))
-        if path.suffix.lower() == ".npz"
-        else _table(
-            path, coordinates, needed, units or {}, np.zeros(len(coordinates)) if rest is None else rest
-        )
-    )
-    q, T = found
+    if path.suffix.lower() == ".npz":
+        q, T = _archive(path, len(coordinates))
+    else:
+        rest = np.zeros(len(coordinates)) if rest is None else rest
+        q, T = _table(path, coordinates, needed, units or {}, rest)
     T = T.copy()
     positions = T if T.ndim == 2 else T[:, :3, 3]
     positions *= UNITS[unit]
@@ -703,9 +671,8 @@ def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
             where=f"{where}, pose {int(bad.argmax())}",
             found=str(T[bad.argmax()].tolist()),
         )
-    U, _, Vt = np.linalg.svd(R)
     good = T.copy()
-    good[:, :3, :3] = U @ Vt
+    good[:, :3, :3] = polar_factor(R)
     return good
 
 

@@ -52,7 +52,7 @@ therefore computes base and target alternately.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
@@ -69,9 +69,8 @@ from urdfkin.verify.singular_values import singular_values
 
 #: The elimination may keep a column if its remainder is at least this fraction of the longest remainder.
 _AS_GOOD = 0.5
-#: If a parameter is fixed, a message names fitted parameters that together have the same effect. The message
-#: names at most `_NAMED` fitted parameters. It names a fitted parameter only if its effect is more than the
-#: fraction `_SHARE` of the fixed parameter's effect.
+#: If a parameter is fixed, a message names fitted parameters that together have the same effect.
+#: It names at most `_NAMED` of them, each with more than the fraction `_SHARE` of the fixed one's effect.
 _NAMED, _SHARE = 3, 1e-6
 
 
@@ -98,13 +97,8 @@ class Identification:
 def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray | None = None) -> FloatArray:
     """Return the Jacobian (rows, p) of all measured coordinates, in metres.
 
-    The rows for rotations are multiplied by the length `way.size`, and are then in metres too.
-
-    Args:
-        model: The model.
-        values: (s, n) joint values.
-        complete: True if full poses are measured, False if only positions are measured.
-        at: (p,) parameters at which the Jacobian is computed. None: the model's start values.
+    The rows for rotations are multiplied by the length `way.size`, and are then in metres too. The arguments
+    are those of `identify`.
     """
     L = model.way.size
     _, columns = model.way.columns(values, at)
@@ -117,13 +111,10 @@ def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray 
 def identify(
     model: Model, values: FloatArray, *, complete: bool = True, at: FloatArray | None = None
 ) -> Identification:
-    """Determine which parameters of a model are identifiable from some configurations.
+    """Determine which parameters of a model are identifiable from the joint values (s, n).
 
-    Args:
-        model: The model.
-        values: (s, n) joint values.
-        complete: True if full poses are measured, False if only positions are measured.
-        at: (p,) parameters at which the Jacobian is computed. None: the model's start values.
+    `complete` is True for measured full poses, False for positions. The Jacobian is computed at the
+    parameters `at` (p,), by default the model's start values.
     """
     J = stacked(model, values, complete=complete, at=at)
     error = np.full_like(J, model.way.rounding(values))
@@ -165,24 +156,28 @@ def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int],
     )
     shares = np.abs(shares) / np.linalg.norm(column)
     order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _SHARE]
-    names = [str(model.way.parameters[kept[i]]) for i in order[:_NAMED]]
-    more = f" and {len(order) - _NAMED} more" if len(order) > _NAMED else ""
-    return f"same effect as {', '.join(names)}{more}{' together' if len(order) > 1 else ''}"
+    names = first_names((str(model.way.parameters[kept[i]]) for i in order), _NAMED)
+    return f"same effect as {names}{' together' if len(order) > 1 else ''}"
 
 
-#: If the sum of all redundancies is below this number, the fit cannot be checked.
+def first_names(names: Iterable[str], most: int) -> str:
+    """Return the first `most` names for a message, and the number of the others."""
+    every = list(names)
+    return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
+
+
+#: A fit cannot be checked if the sum of all redundancies is below this number.
 _ONE_OR_MORE = 0.5
-#: An eigenvalue of the matrix 1 - H_ii is replaced by zero if it is below this fraction of the largest
-#: eigenvalue. If a pose has an error along an eigenvector with a smaller eigenvalue, the residuals do not
-#: show this error.
+#: An eigenvalue of 1 - H_ii below this fraction of the largest eigenvalue is replaced by zero.
+#: The residuals do not show an error of the pose along the eigenvector of such an eigenvalue.
 _FOLLOWED = 1e-9
-#: Largest number of noise estimates. The estimation ends when the noise changes by at most this fraction.
+#: At most `_ESTIMATES` noises are estimated; a relative change of at most `_STAYS` ends the estimation.
 _ESTIMATES, _STAYS = 20, 1e-3
-#: Probability that an outlier is reported for a data set that has no outliers.
+#: An outlier is reported with this probability for a data set that has no outliers.
 WRONGLY = 0.01
 #: A parameter that changed by less than this number of standard deviations is not written.
 SIGMAS = 2.0
-#: Largest share of outliers among all poses.
+#: At most this share of all poses may be outliers.
 _MOST_ODD = 0.25
 
 
@@ -202,25 +197,18 @@ class Measured:
 
     @property
     def complete(self) -> bool:
-        """Whether orientations were measured."""
         return self.R is not None
 
     def __len__(self) -> int:
         return len(self.p)
 
     def some(self, which: NDArray[np.bool_]) -> Measured:
-        """Return the measurements selected by the mask `which` (s,)."""
         return Measured(self.values[which], self.p[which], None if self.R is None else self.R[which])
 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of the measured positions and orientations.
-
-    Attributes:
-        metres: Standard deviation of each coordinate of a position (m).
-        radians: Standard deviation of the rotation about each axis (rad).
-    """
+    """Standard deviations: of each position coordinate (m), and of the rotation about each axis (rad)."""
 
     metres: float
     radians: float
@@ -286,8 +274,8 @@ class Fit:
 def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
     """Return the residuals, measured minus computed: (s, 6) for poses or (s, 3) for positions.
 
-    Each row contains the position error (m) and, for full poses, the rotation error (rad). The components of
-    the errors are along the axes of the base frame.
+    Each row contains the position error (m) and, for full poses, the rotation error (rad), along the axes of
+    the base frame.
     """
     return _apart(measured, model.way.poses(measured.values, at))
 
@@ -302,14 +290,9 @@ def _apart(measured: Measured, T: FloatArray) -> FloatArray:
 def best_fit(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise | None, at: FloatArray
 ) -> Fit:
-    """Fit a model to measurements by least squares.
+    """Fit the parameters `kept` to measurements by least squares, from the start values `at` (p,).
 
-    Args:
-        model: The model.
-        measured: The measurements.
-        kept: Indices of the parameters to fit.
-        noise: The known noise; if `noise` is None, the noise is estimated from the residuals.
-        at: (p,) start values.
+    If `noise` is None, the noise is estimated from the residuals.
     """
     weights = noise or Noise(1.0, 1.0 / model.way.size)
     for _ in range(1 if noise else _ESTIMATES):
@@ -331,11 +314,7 @@ def best_fit(
 
 
 def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
-    """Estimate the noise from the residuals.
-
-    The residuals are divided by the noise. The estimate is therefore never below rounding error, so that no
-    residual is divided by zero.
-    """
+    """Estimate the noise from the residuals; it is never below rounding error, because it is a divisor."""
     rounding = model.way.rounding(measured.values)
 
     def of(part: slice, least: float, former: float) -> float:
@@ -402,10 +381,9 @@ def _evaluate(model: Model, measured: Measured, kept: Sequence[int], noise: Nois
 def odd_poses(
     model: Model, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
 ) -> tuple[tuple[int, ...], Fit]:
-    """Return the indices of the outliers, and the fit without them."""
     out = list[int]()
-    # Without the outliers, there must still be more measured numbers than parameters. At most a quarter of
-    # the poses may be outliers.
+    # Without the outliers, there must still be more measured numbers than parameters.
+    # At most a quarter of the poses may be outliers.
     most = min(int(_MOST_ODD * len(measured)), len(measured) - 1 - -(-len(kept) // found.errors.shape[1]))
     clean = found
     while len(out) < most:
@@ -426,12 +404,8 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
     Each step resets the least significant parameter to its old value. It also adjusts the other parameters by
     their covariance with the reset parameter. The elimination ends when all remaining parameters are
     significant. If the measurements determine only a combination of two parameters, one of these two
-    parameters remains selected.
-
-    Args:
-        moved: (k,) change of each parameter.
-        covariance: (k, k) covariance of the changes; inf for entries that are unknown.
-        fixed: (k,) whether a parameter is always selected, even if its change is not significant.
+    parameters remains selected. A `fixed` parameter is always selected. Unknown entries of the covariance are
+    inf.
 
     >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -463,19 +437,16 @@ def quantile(share: float, freedom: int) -> float:
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Largest number of repetitions in which base and target are computed alternately. The repetitions end when
-#: the position of the target changes by at most this fraction.
+#: At most `_TURNS` repetitions compute base and target alternately.
+#: They end when the position of the target changes by at most the fraction `_FIXED_END`.
 _TURNS, _FIXED_END = 200, 1e-9
-#: Largest allowed spread of the measured positions, relative to the spread of the robot's tip positions.
+#: Measured positions may spread at most this number of times more than the robot's tip positions.
 #: With positions in millimetres by mistake, this ratio is about 1000.
 _FARTHER = 100.0
 
 
 def starting(model: Model, measured: Measured) -> FloatArray:
-    """Return start values (p,) of all parameters.
-
-    Base and tool are computed from the measured poses. The other parameters have the model's values.
-    """
+    """Return start values (p,): base and tool from the measured poses, other parameters from the model."""
     at = model.way.start.copy()
     places = {parameter.where for parameter in model.way.parameters if parameter.end}
     if not places:
@@ -558,12 +529,7 @@ def _translations(
 
 
 def demand_plausible(model: Model, measured: Measured) -> None:
-    """Check that measured positions are in metres.
-
-    Raises:
-        InputError: the spread of the measured positions is more than 100 times the spread of the robot's tip
-            positions.
-    """
+    """Raise InputError if measured positions spread 100 times more than the tip: they are not in metres."""
     T = model.way.poses(measured.values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measured.p)

@@ -1,6 +1,4 @@
-"""Model a path; its parameters are the URDF's origins or the table's cells.
-
-Compute the Jacobian with respect to the parameters.
+"""Model a path whose parameters are the URDF's origins or the table's cells, and compute its Jacobian.
 
 A model is a path (`urdfkin.model.path`). A path is a product of constant poses and elementary motions. Each
 joint origin of a URDF is a product of this kind, and so is each row of a Denavit-Hartenberg table. The angle
@@ -98,10 +96,7 @@ class ParametricChain:
 
     @property
     def size(self) -> float:
-        """Sum of all lengths of the model, metres; 1 if this sum is 0.
-
-        This length converts radians to metres.
-        """
+        """Sum (m) of all lengths of the model, or 1 if it is 0; this length converts radians to metres."""
         lengths = [
             float(np.linalg.norm(step[:3, 3])) for step in self.path.steps if not isinstance(step, Motion)
         ]
@@ -144,7 +139,7 @@ class ParametricChain:
         return factors * numbers, factors
 
     def rounding(self, values: FloatArray) -> float:
-        """Bound the rounding error (metres) of each number that `columns` returns.
+        """Bound the rounding error (m) of each number that `columns` returns.
 
         For numbers in radians, the bound is the result divided by `size`.
         """
@@ -154,19 +149,18 @@ class ParametricChain:
 
 
 #: Two axes of a table are treated as parallel if the angle (rad) between them is at most this number.
-#: Parallel axes of a real arm deviate by some milliradians. The common normal of such axes is far from the
-#: arm. Its distance is about a link's length divided by the angle.
+#: Parallel axes of a real arm deviate by some milliradians.
+#: The distance of their common normal from the arm is about a link's length divided by the angle.
 PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: The six parameters of an origin, in the order of multiplication. Each entry contains the name, whether the
-#: motion is a rotation, and the index of the coordinate axis.
+#: An origin has six parameters, in the order of multiplication.
+#: Each entry contains the name, whether the motion is a rotation, and the index of the coordinate axis.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order of preference among parameters with the same effect. The key is True for revolute joints, and False
-#: for prismatic joints. The joint's zero comes first, then motions of the joint's axis, then motions of the
-#: joint's frame alone.
+#: Parameters with the same effect have an order of preference, for revolute (True) and prismatic joints.
+#: The joint's zero comes first, then motions of its axis, then motions of its frame alone.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
@@ -266,7 +260,6 @@ class _Maker:
             self.push(which, _ALL, end=True)
 
     def push(self, where: str, only: Collection[str], *, backwards: bool = False, end: bool = False) -> None:
-        """Add all or some of the six parameters of a joint, base or tool."""
         moves = [
             Drive(axis, turns, self.parameter(where, what, "rad" if turns else "m", end=end))
             for what, turns, axis in SIX
@@ -287,7 +280,7 @@ class _Maker:
     ) -> Model:
         """Return the model; `kept` lists the parameters of each joint in order of preference."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
-        # Base and tool come first because they are unknown. The parameters of the joints are nearly known.
+        # Base and tool come first because they are unknown; the parameters of the joints are nearly known.
         places = dict.fromkeys((p.where, p.end) for p in self.parameters)
         groups = tuple(
             tuple(at[*place, what] for what in kept.get(place[0], _KEPT[True]) if (*place, what) in at)
@@ -298,14 +291,11 @@ class _Maker:
 
 
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> Model:
-    """Make a parametric model of a URDF's path.
+    """Make a parametric model of a URDF's path; `fit` selects the sets of parameters.
 
-    `fit` selects the sets of parameters. The last fixed joint before the tip also has parameters. Other fixed
-    joints have no parameters, because parameters of the neighbouring moving joints have the same effect.
-
-    Raises:
-        UnknownNameError: a frame or a set of parameters does not exist.
-        InputError: the path has a planar or floating joint.
+    The last fixed joint before the tip also has parameters. Other fixed joints have none, because parameters
+    of the neighbouring moving joints have the same effect. An unknown frame or set raises UnknownNameError; a
+    planar or floating joint on the path raises InputError.
     """
     path: FrameChain = chain(tree, tip, base)
     maker, number = _Maker(fit), 0
@@ -342,13 +332,10 @@ def _parameters_to_fit(fit: Collection[str], joint: Joint, *, ending: bool) -> C
 
 
 def table_model(table: DHTable, fit: Collection[str]) -> Model:
-    """Make the model of a table.
+    """Make the model of a table; an unknown set of parameters raises UnknownNameError.
 
     The set "origins" contains all cells. The set "offsets" contains the cells to which joint values are
     added.
-
-    Raises:
-        UnknownNameError: a set of parameters does not exist.
     """
     maker = _Maker(fit)
     maker.end("base")

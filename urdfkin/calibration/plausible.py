@@ -1,8 +1,8 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
-A fit always has some result, even if joint angles are in degrees, rows of q belong to other poses, or the
-sign of a joint is reversed. A fit is refused if its residuals are a large fraction of the robot's reach, or
-if it hardly improves the original model. A fit that tilts a joint's axis by a large angle, or that has no
+A fit always has some result, even if joint angles are in degrees, rows of q are shifted, or the sign of a
+joint is reversed. A fit is refused if its residuals are a large fraction of the robot's reach, or if it
+hardly improves the original model. A fit that tilts a joint's axis by a large angle, or that has no
 redundancy, is refused too. The module then corrects each common mistake in the data and fits again. If the
 fit is plausible after a correction, the corrected mistake is the likeliest one.
 """
@@ -10,9 +10,9 @@ fit is plausible after a correction, the corrected mistake is the likeliest one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from urdfkin.calibration.fit import (
     Noise,
     best_fit,
     errors,
+    first_names,
     identify,
     starting,
 )
@@ -30,34 +31,36 @@ from urdfkin.calibration.parameters import Model, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
-#: Limits of the rms position error, as fractions of the reach. A fit with an error above `_MISSED` is
-#: refused. The comments of `_UNEXPLAINED` and `_HARDLY_BELOW` explain `_CLOSE_BY` and `_NO_BETTER`. If the
-#: error is above `_SUSPECT`, urdfkin corrects each common mistake in the data and fits again.
+#: The limits of the rms position error are fractions of the reach.
+#: A fit with an error above `_MISSED` is refused.
+#: The comments of `_UNEXPLAINED` and `_HARDLY_BELOW` explain `_CLOSE_BY` and `_NO_BETTER`.
+#: Above `_SUSPECT`, urdfkin corrects each common mistake in the data and fits again.
 _MISSED, _CLOSE_BY, _NO_BETTER, _SUSPECT = 0.05, 0.01, 0.03, 0.002
-#: Largest error of a fit, as a fraction of the spread of measured positions.
+#: This limit of a fit's error is a fraction of the spread of measured positions.
 #: A fit with a larger error is refused if the error also exceeds `_CLOSE_BY` times the reach.
 _UNEXPLAINED = 0.25
-#: Largest error of a fit, as a fraction of the error before the fit.
+#: This limit of a fit's error is a fraction of the error before the fit.
 #: A fit with a larger error is refused if the error also exceeds `_NO_BETTER` times the reach.
 _HARDLY_BELOW = 0.7
-#: Limits of the rms orientation error, radians. A fit with an error above `_MISTURNED` is refused. If the
-#: error is above `_SUSPECT_TURN`, urdfkin corrects each common mistake in the data and fits again.
+#: The limits of the rms orientation error are in radians.
+#: A fit with an error above `_MISTURNED` is refused.
+#: Above `_SUSPECT_TURN`, urdfkin corrects each common mistake in the data and fits again.
 _MISTURNED, _SUSPECT_TURN = 0.2, 0.005
-#: Largest plausible tilt of a joint's axis, radians, and largest plausible gain.
+#: These are the largest plausible tilt of a joint's axis (rad) and the largest plausible gain.
 _TILTED, _GAINED = 0.5, 0.5
 #: Two configurations are treated as one if their joint values (rad, m) differ by less than this number.
 _ONE_CONFIGURATION = 1e-6
 #: urdfkin subtracts this number of standard deviations from a change, and compares the rest with the limit.
 #: The reason is that the tilt of an axis near the target is poorly observable.
 _UNCERTAIN = 5.0
-#: Largest error after a correction, as a fraction of the error before the correction. The limit is `_BETTER`
-#: if the fit before the correction is accepted, and `_NOT_WORSE` if that fit is refused.
+#: The limit of the error after a correction is a fraction of the error before the correction.
+#: The limit is `_BETTER` for an accepted fit before the correction, and `_NOT_WORSE` for a refused one.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted, beginning with the most promising corrections. Other corrections
-#: assign each row of q to the pose that is one or two rows earlier or later (`_SHIFTS`).
+#: `_FITTED` is the number of corrections that are fitted; the most promising ones are fitted first.
+#: A correction of `_SHIFTS` assigns each row of q to the pose that is one or two rows earlier or later.
 _FITTED, _SHIFTS = 4, (1, -1, 2, -2)
-#: Largest number of joints that a message names.
-_NAMED = 4
+#: A message names at most four joints.
+_list = partial(first_names, most=4)
 
 
 @dataclass(frozen=True)
@@ -98,10 +101,7 @@ class Ended:
 def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
     """Check whether a fit is plausible, and find the likeliest mistake if it is not.
 
-    Args:
-        model: The model.
-        ended: The fit with its data.
-        radians: Whether large joint angles are known to be radians.
+    `radians` says whether large joint angles are known to be radians.
     """
     few = _too_few(ended)
     misfits = [*_misfits(model, ended), *_extreme_parameters(model, ended)]
@@ -190,10 +190,7 @@ def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
 
 
 def _turned_zeros(model: Model, ended: Ended) -> list[str]:
-    """Return the joints whose zero changed by about half a turn.
-
-    A reversed sign of the next joint causes such a change.
-    """
+    """Return the joints whose zero changed by about half a turn, as after a sign error of the next joint."""
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
         for parameter, moved, surely in _changes(model, ended)
@@ -289,10 +286,8 @@ def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
             reason = (
                 f"q is shifted by {rows} relative to the poses; the correct q of each pose is {rows} {way}"
             )
-            if by > 0:
-                yield _Correction(reason, q[by:], 0, len(q) - by)
-            else:
-                yield _Correction(reason, q[:by], -by, None)
+            shifted = q[by:] if by > 0 else q[:by]
+            yield _Correction(reason, shifted, max(-by, 0), len(q) - max(by, 0))
     for j, name in enumerate(model.coupling.names):
         yield _Correction(_sign((name,)), q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0))
 
@@ -338,8 +333,6 @@ def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
 
 
 class _Trial:
-    """A correction and its fit."""
-
     def __init__(self, model: Model, ended: Ended, correction: _Correction, reach: float) -> None:
         self.model, self.correction, self.reach = model, correction, reach
         chosen = slice(correction.first, correction.last)
@@ -349,7 +342,7 @@ class _Trial:
         )
         self.weights = Noise(1.0, 1.0 / reach)
         self.start = starting(model, self.measured)
-        #: Error (m) per pose when only base and tool are fitted.
+        #: This error (m) per pose is that of a fit of only base and tool.
         self.left_before = _size(errors(model, self.measured, self.start), reach) / math.sqrt(
             len(self.measured)
         )
@@ -390,8 +383,3 @@ def _left(ended: Ended, reach: float) -> float:
 def _rms(fit: Fit) -> str:
     metres, turn = fit.rms()
     return length(metres) if turn is None else f"{length(metres)}, {angle(turn)}"
-
-
-def _list(names: Iterable[str]) -> str:
-    every = list(names)
-    return ", ".join(every[:_NAMED]) + (f" and {len(every) - _NAMED} more" if len(every) > _NAMED else "")

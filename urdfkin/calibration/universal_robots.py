@@ -36,7 +36,7 @@ from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: The links in the calibration file from base to tip, each with its parent joint.
+#: Each link in the calibration file, from base to tip, has a parent joint.
 LINKS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",
@@ -45,33 +45,26 @@ LINKS = {
     "wrist_2": "wrist_2_joint",
     "wrist_3": "wrist_3_joint",
 }
-#: SciPy's names of the two orders.
-#: Lowercase letters are rotations about fixed axes, uppercase letters are rotations about moving axes.
+#: SciPy's names of the two orders; lowercase letters are fixed axes, uppercase letters moving axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
-#: Number of configurations for the fit of the origins. The check of the fit uses the same number of other
-#: configurations.
+#: The fit of the origins uses this number of configurations; its check uses as many others.
 _FITTED = 40
-#: Seeds of the random configurations for the fit of the origins, and for the check of this fit.
+#: The fit of the origins and its check use random configurations with these seeds.
 _FITTED_SEED, _CHECKED_SEED = 2, 3
-#: Largest allowed residual of the fit, in metres and in radians.
+#: The fit may have this residual at most, in metres and in radians.
 #: The numbers in the file have nine digits, and their rounding causes residuals of this size.
 _LEFT = 1e-8
-#: Number of configurations on which two calibrations are compared.
+#: Two calibrations are compared on this number of configurations.
 _COMPARED = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
     """Read the (4, 4) origin of each joint; the keys are joint names without a prefix.
 
-    Args:
-        path: The driver's YAML, or a `default_kinematics.yaml` of its robot description.
-        order: Order of the rotations: "driver" or "urdf".
-
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: the file is not a calibration, or a link or a number is missing.
-        UnknownNameError: the order is unknown.
+    The file is the driver's YAML, or a `default_kinematics.yaml` of its robot description. A file that cannot
+    be read raises SourceError. A file that is not a calibration, or lacks a link or a number, raises
+    InputError. An order other than "driver" and "urdf" raises UnknownNameError.
     """
     if order not in ORDERS:
         raise UnknownNameError("order of rotations", order, ORDERS)
@@ -123,18 +116,9 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
     In the current ROS description all six joints turn about z. The joint origins are then replaced by the
     origins in the calibration file. In other URDFs, for example of the older ROS description, the joint
-    origins are fitted. The fitted arm then has the same poses of `tool0` in `base` as the calibrated arm.
-
-    Args:
-        robot: The arm.
-        path: The driver's YAML file.
-        order: Order of the rotations in the file: "driver" agrees with the robot's controller, "urdf" with
-            the ROS description.
-
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: the file is not a calibration, or the robot is not a Universal Robots arm.
-        UnknownNameError: the order is unknown.
+    origins are fitted. The fitted arm then has the same poses of `tool0` in `base` as the calibrated arm. A
+    robot that is not a Universal Robots arm raises InputError; the errors of the file are those of
+    `read_calibration`.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)

@@ -28,7 +28,7 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import before, numbers, with_attributes
 from urdfkin.verify.certificate import Certificate
 
-#: Number of decimals of written metres and radians: the precision of a double near 1 m or 1 rad.
+#: Metres and radians are written with this number of decimals, the precision of a double near 1.
 _DECIMALS = 15
 _SAME = 10.0**-_DECIMALS
 
@@ -37,13 +37,11 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """Return the URDF's bytes with new origins (4, 4) of joints, by name.
 
     A number that is unchanged up to rounding keeps its digits. A rotation has several triples of roll, pitch
-    and yaw angles; the triple nearest to the old angles is written.
-
-    Raises:
-        InputError: the text has errors, or a joint does not exist.
+    and yaw angles; the triple nearest to the old angles is written. Errors in the text, or a joint that does
+    not exist, raise InputError.
     """
     report = Reporter("<text>", data)
-    urdf = read_urdf(report, mimic=False)  # mimic rules do not affect origins
+    urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
     if urdf is None or report.failed:
         errors = [one for one in report.findings() if one.severity is Severity.ERROR]
         raise InputError("a URDF with errors is not edited", found=str(errors[0]))
@@ -89,7 +87,7 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw have the same axis: only their combination is defined
+    if math.cos(pitch) <= ANGLE * EPS:  # Roll and yaw have the same axis: only their combination is defined.
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [
@@ -101,13 +99,7 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Rewritten:
-    """A robot with new joint origins.
-
-    Attributes:
-        robot: The original robot.
-        origins: The new origin (4, 4) of each joint that moved, by joint name.
-        certificate: Pinocchio's check of the new text.
-    """
+    """A robot with new joint origins (4, 4), by joint name, and Pinocchio's check of the new text."""
 
     robot: Robot
     origins: Mapping[str, FloatArray]
@@ -123,7 +115,7 @@ class Rewritten:
         """The robot of the new text, loaded with the same options as the original."""
         mimic = self.robot.verifier.mimic
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the first load gave these warnings
+            warnings.simplefilter("ignore")  # The first load gave these warnings.
             lock = dict(self.robot.origin.lock)
             return load(self.text, mimic=mimic, root_joint=self.robot.root_joint, lock=lock)
 

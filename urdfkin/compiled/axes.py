@@ -20,27 +20,21 @@ from urdfkin.kinematics import equations as eq
 
 
 def link_axes(own, world):
-    """Return the first argument, the vector in the link's own axes."""
     return own
 
 
 def world_axes(own, world):
-    """Return the second argument, the vector in world axes."""
     return world
 
 
 def seen(axes, R, x):
-    """Return a vector's components in the axes that the function `axes` selects.
-
-    The components of x are in the link's own axes. The function `axes` is `link_axes` or `world_axes`.
-    """
+    """Return the components of x, given in the link's axes, in the axes of `link_axes` or `world_axes`."""
     return axes(x, eq.rotate(R, x))
 
 
 def seen_after(axes, S, x):
     """Return a velocity or acceleration x of a link after the link's frame is rotated by S.
 
-    If the recursion uses world axes, the components of x do not change. If the recursion uses the link's own
-    axes, the components are converted to the rotated axes.
+    In world axes, the components of x do not change. In the link's axes, they are rotated.
     """
     return axes(eq.rotate(eq.transposed(S), x), x)

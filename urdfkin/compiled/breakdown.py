@@ -47,7 +47,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
 
 
-#: Number of samples of a batch that are displayed.
+#: This number of samples of a batch is displayed.
 _SHOWN = 2
 
 
@@ -113,10 +113,7 @@ class AccelerationBreakdown(Displayable):
 
 
 class _Moves(NamedTuple):
-    """The velocity or acceleration of a joint relative to its parent link, in world axes.
-
-    The linear part and the angular part each have the shape (n, 3).
-    """
+    """The velocity or acceleration (n, 3) of a joint relative to its parent link, in world axes."""
 
     slide: FloatArray
     turn: FloatArray
@@ -134,7 +131,7 @@ def acceleration_breakdown(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> AccelerationBreakdown:
-    """Return the contributions to the classical acceleration of a link's frame.
+    """Return the contributions to the classical acceleration of a link's frame, with one leading axis n.
 
     Args:
         tree: The robot.
@@ -145,19 +142,16 @@ def acceleration_breakdown(
         reference: The reference frame of the result.
         base: (1 or n, 24) state of the base, see `BaseMotion.state`.
         out: (n, joints, 4, 6) array for the terms.
-        threads: Largest number of threads; None for `batch.default_threads`.
-
-    Returns:
-        The contributions, with one leading axis n.
+        threads: Largest number of threads; None for `evaluate.default_threads`.
 
     Raises:
         NotFiniteError: a number of q, v or a is not finite.
         RangeError: a contribution exceeds the range of double precision.
     """
-    if not np.isfinite(a).all():  # the recursions that are called below check q and v
+    if not np.isfinite(a).all():  # The recursions that are called below check q and v.
         raise NotFiniteError("q, v and a must be finite")
     moving = moving_joints(tree, link)
-    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # all links on the path
+    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # The frames are all links on the path.
     n = len(q)
     terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
     of_base = np.empty((n, 6))
@@ -183,7 +177,7 @@ def moving_joints(tree: KinematicTree, link: int) -> list[int]:
     return [i for i in tree.path(link) if tree.joints[i].kind.nv]
 
 
-# a result that is not finite raises an error at the end of this function
+# A result that is not finite raises an error at the end of this function.
 @np.errstate(over="ignore", under="ignore", invalid="ignore")
 def _contributions(
     tree: KinematicTree,
@@ -196,10 +190,7 @@ def _contributions(
     base: FloatArray,
     terms: FloatArray,
 ) -> FloatArray:
-    """Write the joints' contributions to `terms`, and return the base's contribution.
-
-    Joint k of the path moves link k + 1 of the path.
-    """
+    """Write the joints' contributions to `terms`, and return the base's contribution."""
     path = tree.path(link)
     Ts = placements(plan, q, base=base, threads=1)
     velocity = velocities(plan, q, v, base=base, threads=1)
@@ -232,10 +223,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _slide(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return a joint's translation (n, 3) in the joint's axes, from the joint's coordinates q.
-
-    For planar and floating joints, the first coordinates are the translation.
-    """
+    """Return a joint's translation (n, 3) in the joint's axes, from the joint's coordinates q."""
     slide = np.zeros((len(q), 3))
     match joint.kind:
         case JointKind.PLANAR:
@@ -281,10 +269,7 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
 
 
 def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration of a point that is fixed to the base (7.123).
-
-    The vector d leads from the base's origin to the point.
-    """
+    """Return the acceleration of a point that is fixed to the base (7.123), at d from the base's origin."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

@@ -1,12 +1,9 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs have the shapes (n, nq) and (n, nv); `urdfkin.robot` has checked and reshaped them. If all n
-configurations have the same input, this input is not copied n times. A few configurations are computed with
-Python numbers, and more configurations by a compiled kernel (`preload`). The kernel returns exactly the same
-doubles as the Python numbers.
-
-A large batch is computed with several threads. Each configuration is computed independently of the others, so
-the results are exactly the same for any number of threads.
+Inputs have the shapes (n, nq) and (n, nv); `urdfkin.robot` has checked and reshaped them. A few
+configurations are computed with Python numbers, and more configurations by a compiled kernel (`preload`) in
+several threads. The results are exactly the same doubles for each kind of computation and any number of
+threads.
 """
 
 from __future__ import annotations
@@ -44,11 +41,9 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: If the results have at least this number of bytes, they are written to memory and not to the caches, which
-#: are too small.
+#: Results with at least this number of bytes are written to memory, because the caches are too small.
 _STREAMED = 2 << 20
-#: Largest number of doubles in the buffer of results. A full buffer fills half of the processor's first-level
-#: cache.
+#: The buffer of results has at most this number of doubles, which fill half of the first-level cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -61,8 +56,7 @@ class How(TypedDict, total=False):
         base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
         out: C-contiguous float64 array of the result's size, for the result.
         threads: Largest number of threads; None uses all processors for large batches.
-        read: Whether the caller reads the results immediately. If True, the results stay in the processor's
-            caches.
+        read: Whether the caller reads the results immediately, so that they stay in the processor's caches.
     """
 
     base: FloatArray
@@ -161,13 +155,12 @@ def _compute(
 ) -> FloatArray:
     """Return a result (n, frames, *shape) that is computed from q, or q and v, or q, v and a.
 
-    Raises:
-        NotFiniteError: an input is not finite.
-        RangeError: a result is not finite, although the inputs are.
+    An input that is not finite raises NotFiniteError; a result that is not finite raises RangeError.
     """
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    inputs = [base, *(x[:1] if _is_broadcast(x) else x for x in inputs)]
+    # An array with the stride 0 is one row that was broadcast to all rows.
+    inputs = [base, *(x[:1] if len(x) > 1 and x.strides[0] == 0 else x for x in inputs)]
     if (odd := _interpreted(name, program, reference, inputs, out, threads)) is None:
         odd = _compiled(name, program, reference, inputs, out, threads, staged=is_staged(out) and not read)
     if odd or plan.is_large or _is_large(base):
@@ -213,11 +206,8 @@ def _lists(
     task: list[Any] = [0] * len(KernelArgs)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.lists
     task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = [None] * program.rows, result
-    task[KernelArgs.REFERENCE], task[KernelArgs.N], task[KernelArgs.WIDTH] = (
-        REFERENCES[reference],
-        1,
-        len(result),
-    )
+    task[KernelArgs.REFERENCE] = REFERENCES[reference]
+    task[KernelArgs.N], task[KernelArgs.WIDTH] = 1, len(result)
     for place, x in zip(_PLACES, inputs, strict=False):
         task[place] = x[0 if len(x) == 1 else i].tolist()
     if inputs[0] is STILL_STATE:
@@ -235,10 +225,7 @@ def _compiled(
     *,
     staged: bool,
 ) -> int:
-    """Compute with a compiled kernel.
-
-    Return whether an input is not ordinary (nan, infinite or too large).
-    """
+    """Compute with a compiled kernel; return whether an input is nan, infinite or too large."""
     core = preload.kernel(name)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
@@ -264,14 +251,8 @@ def task_of(
 ) -> tuple[NDArray[np.int64], object]:
     """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished.
 
-    Args:
-        program: The program of the recursion.
-        reference: The reference frame of the results.
-        inputs: Arrays: the base's state, q and, if needed, v and a. Each array has one row for all
-            configurations, or one row for each configuration.
-        out: (n, ...) array for the result.
-        staged: Whether the kernel writes results to a buffer first, and then copies the buffer to `out` (see
-            `is_staged`).
+    `inputs` are the base's state, q and, if needed, v and a; each has one row, or one row for each
+    configuration. If `staged`, the kernel writes results to a buffer first (see `is_staged`).
     """
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
@@ -287,17 +268,11 @@ def task_of(
     return task, (memory, stage)
 
 
-def _is_broadcast(x: FloatArray) -> bool:
-    """Return whether the array is one row that was broadcast to all rows."""
-    return len(x) > 1 and x.strides[0] == 0
-
-
 def _is_large(base: FloatArray) -> bool:
     return base is not STILL_STATE and not float(np.abs(base).max(initial=0.0)) < LARGE
 
 
 def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Raise an error if an input or a result is not finite."""
     if not all(np.isfinite(x).all() for x in inputs):
         raise NotFiniteError("q, v and a must be finite")
     finite = np.isfinite(out).all(axis=tuple(range(1, out.ndim)))
@@ -313,20 +288,17 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
 #: Starting a thread takes about ten microseconds.
 _WORTH_THREADS = 4096
 
-#: Number of configurations that NumPy computes at a time.
+#: NumPy computes this number of configurations at a time.
 #: The intermediate results then fit into the processor's cache.
 PART = 2048
 
-#: A function (inputs, out) that computes the rows of `out` from the rows of the inputs.
+#: The function computes the rows of its argument `out` from the rows of its argument `inputs`.
 #: The function returns 1 if an input is nan, infinite or too large, else 0 (see `machine.memory.ordinary`).
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
 def default_threads(n: int) -> int:
-    """Return the default number of threads for n configurations.
-
-    The number is 1 for a small batch, else the number of processors that this process may use.
-    """
+    """Return 1 for a small batch, else the number of processors that this process may use."""
     return _processors() if n >= _WORTH_THREADS else 1
 
 
@@ -340,16 +312,9 @@ def _processors() -> int:
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
     """Compute `out` (n, ...) with several threads; each array of `inputs` is (n, ...) or (1, ...).
 
-    The result is 1 if an input is nan, infinite or too large, else 0.
-
-    Args:
-        compute: The computation, which must release Python's global interpreter lock.
-        inputs: C-contiguous arrays.
-        out: C-contiguous array.
-        threads: Largest number of threads; None for the number from `default_threads`.
-
-    Raises:
-        InputError: `threads` is not an integer of at least 1.
+    The result is 1 if an input is nan, infinite or too large, else 0. All arrays are C-contiguous. `compute`
+    must release Python's global interpreter lock. `threads` is the largest number of threads; None stands for
+    `default_threads`, and anything but an integer of at least 1 raises InputError.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
@@ -361,20 +326,14 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         return compute(inputs, out)
     parts = _parts(n, threads)
     work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
-    return max([future.result() for future in work])  # this waits until all threads have finished
+    return max([future.result() for future in work])  # This waits until all threads have finished.
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
-    Args:
-        compute: Computes the rows of a slice. For an empty batch, this function is called once, with an empty
-            slice.
-        n: Number of rows.
-        threads: Largest number of threads, as in `in_blocks`.
-
-    Raises:
-        InputError: `threads` is not an integer of at least 1.
+    `compute` computes the rows of a slice. For an empty batch, it is called once, with an empty slice.
+    `threads` has the same meaning as in `in_blocks`.
     """
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
@@ -388,7 +347,7 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
     if len(shares) == 1:
         return compute_all(parts)
     work = [_pool().submit(compute_all, share) for share in shares]
-    wait(work)  # an error is raised only after all threads have finished writing
+    wait(work)  # An error is raised only after all threads have finished writing.
     for future in work:
         future.result()
     return None

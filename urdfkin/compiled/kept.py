@@ -19,24 +19,21 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
-#: Lock for the import of Numba and for compilations. A fork of the process waits for this lock, because the
-#: child could not finish an import or a compilation. Before a fork, Python acquires the locks in the reverse
-#: order of their creation. The import of Numba uses the lock of the module `logging`. The lock `compiling`
-#: must therefore be created after the lock of `logging`. The lock `compiling` exists before the import of
-#: Numba begins.
+#: This lock protects the import of Numba and the compilations.
+#: A fork of the process waits for this lock, because the child could not finish an import or a compilation.
+#: Before a fork, Python acquires the locks in the reverse order of their creation.
+#: The import of Numba uses the lock of the module `logging`, so `compiling` must be created after that lock.
+#: The lock `compiling` exists before the import of Numba begins.
 compiling = lock_over_forks()
 
-#: A function that receives the events of compilations.
+#: A listener receives the events of compilations.
 #: When a compilation begins, the function is called with the kernel's name and None.
 #: When the kernel is ready, the function is called with the kernel's name and the duration in seconds.
 Listener = Callable[[str, float | None], None]
 
 
 def _log(name: str, seconds: float | None) -> None:
-    """Log a warning about a compilation, at most once in each process.
-
-    By default the warning is printed on standard error.
-    """
+    """Log a warning about a compilation, at most once in each process (by default on standard error)."""
     if seconds is None and not _logged:
         _logged.append(name)
         logging.getLogger("urdfkin").warning(
@@ -63,8 +60,7 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
     """Inform the listener when the compilation of the kernel `name` begins and ends.
 
-    The context yields a function. The caller of `compile_event` must call this function before it compiles
-    the kernel.
+    The context yields a function, which the caller must call before it compiles the kernel.
     """
     begun: list[float] = []
 

@@ -1,9 +1,8 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
 For each output (for example the velocity), a function `follow_...` selects the parts of a link's state that
-the output needs. A function `emit_...` writes the output of a frame. Velocities and accelerations are
-computed in the axes of their reference frame (`urdfkin.compiled.axes`). Jacobian columns are computed in
-world axes; for LOCAL they are rotated to the axes of the frame.
+the output needs. A function `emit_...` writes the output of a frame. Jacobian columns are computed in world
+axes; for LOCAL they are rotated to the axes of the frame.
 """
 
 from __future__ import annotations
@@ -18,8 +17,7 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: Indices of the scratch memory rows that contain the 16 numbers of a pose, and the six numbers of a velocity
-#: or acceleration.
+#: These are the scratch memory rows of a pose (16 numbers), and of a velocity or acceleration (six).
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -32,26 +30,17 @@ def _unused_vector():
 
 
 def follow_place(state):
-    """Mark all vectors of a link's state as unused, except the rotation R and the position p.
-
-    A placement needs only R and p.
-    """
+    """Mark all vectors of a link's state as unused, except the rotation R and the position p."""
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
 def follow_velocity(state):
-    """Mark the accelerations alpha and acc of a link's state as unused.
-
-    A velocity does not depend on accelerations.
-    """
+    """Mark the accelerations alpha and acc of a link's state as unused."""
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
 def follow_acceleration(state):
-    """Mark the linear velocity `vel` of a link's state as unused.
-
-    The acceleration (equation 7.130) does not depend on this velocity.
-    """
+    """Mark the linear velocity `vel` as unused: the acceleration (equation 7.130) does not depend on it."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -73,7 +62,6 @@ def emit_place(m, s, program, place, sources, b, reference, state, to):
 
 
 def _pose_row(s, row, x, last):
-    """Write a row of a 4 by 4 pose, which consists of the vector x and the number `last`."""
     put_vector(s, row, x)
     put(s, row + 3, last)
 
@@ -81,7 +69,7 @@ def _pose_row(s, row, x, last):
 def emit_velocity(m, s, program, place, sources, b, reference, state, to):
     """Write a frame's velocity [linear; angular], 7.127 and 7.128, in the given reference frame."""
     p, w, vel = state[1], state[2], state[3]
-    if reference == _WORLD:  # use the point of the body that is now at the world's origin
+    if reference == _WORLD:  # Use the point of the body that is now at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, vel, w, to)
 
@@ -177,10 +165,7 @@ def column_rate(s, row, to, how, g, c, reference, state):
 
 
 def _end(reference, x):
-    """Return the reference point of a Jacobian column.
-
-    The point is the frame's origin x; for the reference frame WORLD it is the world's origin.
-    """
+    """Return a Jacobian column's reference point: the frame's origin x, or for WORLD the world's origin."""
     if reference == _WORLD:
         nil = same(0.0)
         x = nil, nil, nil
@@ -229,7 +214,7 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
             put_vector(s, program[j + 3], _no_vector())
             put_vector(s, program[j + 3] + 3, _no_vector())
         for i in range(first, end, PAIR_WIDTH):
-            if program[i + 2] == rate:  # the joint with this velocity, or a joint that mimics it
+            if program[i + 2] == rate:  # The joint has this velocity, or mimics the joint that has it.
                 _add_changes(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from urdfkin.compiled.python_numbers import LARGE, Number
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, pose
 
 IntArray = NDArray[np.int64]
 
@@ -82,8 +82,8 @@ _MOTION = {
     JointKind.FLOATING: Motion.FLOATING,
 }
 
-#: The motions of a joint, for example two translations and a rotation for a planar joint. A motion is stored
-#: as the index of its axis in the joint's frame, and True for a rotation or False for a translation.
+#: A planar joint, for example, has two translations and a rotation.
+#: A motion is the index of its axis in the joint's frame, and True for a rotation or False for a translation.
 _RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
     Motion.TURN: ((2, True),),
     Motion.SLIDE: ((2, False),),
@@ -119,13 +119,12 @@ class CompiledTree:
             joint does not move the frame.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) for each moving joint: the index of the previous moving joint on the path from the
-            base. The index is -1 for the first moving joint on a path.
+            base, or -1.
         lengths: (steps + frames,) sums of the lengths of URDF offsets in metres, including the offsets of
             fixed joints. The first sums are from the previous moving joint to each moving joint. The other
             sums are from the last moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
-        tilts: (frames,) the sum of the angles `Joint.tilt`, in rad, of all URDF joints between the root and
-            the frame. The frames are in the order of the output.
+        tilts: (frames,) sum of the angles `Joint.tilt`, rad, of these joints, in output order.
     """
 
     nq: int
@@ -165,10 +164,7 @@ class CompiledTree:
 
     @cached_property
     def turns_only(self) -> bool:
-        """Whether every moving joint is revolute.
-
-        For such a robot, the sum of the link lengths from the base to a frame is constant.
-        """
+        """Whether every moving joint is revolute; the sum of the link lengths to a frame is then constant."""
         return bool((self.steps[:, Step.KIND] == Motion.TURN).all())
 
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
@@ -176,12 +172,7 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Return the compiled tree of the joints that move the given links.
-
-    Args:
-        tree: The robot.
-        links: Indices into `tree.links`, in the order of the results.
-    """
+    """Return the compiled tree of the joints that move the given links, in the order of the results."""
     depths = _depths(tree, links)
     tilts = {0: 0.0}
     for link in depths:
@@ -206,7 +197,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
         frames=np.array(
             [[end.step, place] for end, place in zip(ends, order, strict=True)], dtype=np.int64
         ).reshape(-1, 2),
-        offsets=np.array([(*end.T[:3, :3].ravel(), *end.T[:3, 3]) for end in ends]).reshape(-1, 12),
+        offsets=np.array([_flat(end.T) for end in ends]).reshape(-1, 12),
         columns=columns,
         multipliers=multipliers,
         leaders=leaders[order],
@@ -222,9 +213,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return a dictionary of the links on the paths to the given links.
-
-    The value of a link is the number of joints between the root and the link.
+    """Return the number of joints between the root and each link on the paths to the given links.
 
     Each joint is visited once. A separate path for each link would take time proportional to the tree's
     depth.
@@ -265,10 +254,7 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 def turned(joint: Joint) -> FloatArray:
     """Return the pose (4, 4) of a frame whose z axis is the joint's axis, in the joint's URDF frame."""
-    A = np.eye(4)
-    if joint.kind.has_axis:
-        A[:3, :3] = axis_aligning(joint.axis)
-    return A
+    return pose(axis_aligning(joint.axis) if joint.kind.has_axis else None)
 
 
 def _flat(T: FloatArray) -> FloatArray:
@@ -304,7 +290,6 @@ def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArra
 
 
 def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
-    """Return the array `CompiledTree.leaders`."""
     leaders = np.full((len(ends), len(columns)), -1, dtype=np.int64)
     rows = columns.tolist()
     for frame, end in enumerate(ends):
@@ -323,11 +308,7 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 
 
 class Op(IntEnum):
-    """The instructions of a program.
-
-    For a translation or rotation there are four instructions: for the x axis, the y axis, the z axis, and any
-    axis.
-    """
+    """The instructions of a program; the suffix is the axis, and without a suffix the axis is arbitrary."""
 
     END = 0
     CARRY_X = 1  # translation along a rigid link
@@ -344,7 +325,7 @@ class Op(IntEnum):
     FLOATING = 12
     SAVE = 13
     RESUME = 14
-    KEEP = 15  # store the data that the joint's Jacobian column needs
+    KEEP = 15  # It stores the data that the joint's Jacobian column needs.
     COLUMN = 16
     EMIT = 17
 
@@ -356,35 +337,34 @@ class Head(IntEnum):
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # index of the list of blocks to read from q; a block is eight coordinates
+    BLOCKS_Q = 4  # index of the blocks of q (eight coordinates each)
     BLOCKS_V = 5
     BLOCKS_END = 6
-    ANGLES = 7  # start of the list of joint angles
+    ANGLES = 7  # start of the joint angles
     ANGLES_END = 8
     Q = 9  # first scratch row of the coordinates
     V = 10  # first scratch row of the velocities
     A = 11  # first scratch row of the accelerations
-    BASE = 12  # first scratch row of the base's pose, velocity and acceleration
+    BASE = 12  # first scratch row of the base's motion
 
 
-#: Number of doubles in a row of scratch memory: one double for each of eight configurations. A row fills one
-#: AVX-512 register or two AVX2 registers.
+#: A row of scratch memory has one double for each of eight configurations.
+#: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers in an instruction: the code of the operation, three operands, and the index of the
-#: instruction's constants.
+#: An instruction has five integers: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: A program describes each joint angle by this number of integers: the scratch row of the angle, the scratch
-#: row of its sine, and two integers about the mimic rule. The third integer is the index of the mimic rule in
-#: the constants. The fourth integer is 1 if the joint is a mimic joint, else 0.
+#: Each joint angle has four integers; the first two are the scratch rows of the angle and of its sine.
+#: The third integer is the index of the mimic rule in the constants.
+#: The fourth integer is 1 if the joint is a mimic joint, else 0.
 ANGLE_WIDTH = 4
-#: The first rows of scratch memory have fixed uses: `ZERO_ROW` contains 0, and `ONE_ROW` contains 1. The
-#: results of a frame begin at `OUT_ROW`, and `ANGLE_ROW` contains a joint angle. Other numbers begin at
-#: `FIRST_ROW`.
+#: The first rows of scratch memory have fixed uses: `ZERO_ROW` contains 0, and `ONE_ROW` contains 1.
+#: The results of a frame begin at `OUT_ROW`, and `ANGLE_ROW` contains a joint angle.
+#: Other numbers begin at `FIRST_ROW`.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: For a Hessian, the program describes each Jacobian column by this number of integers. The first integer is
-#: the scratch row of the column, and the second is the index of its moving joint. The third is the index of
-#: the joint's velocity in v. The fourth is the scratch row in which derivatives of the column are summed.
+#: Each Jacobian column of a Hessian has four integers.
+#: The first three are the scratch row of the column, its joint's index, and the index of its velocity in v.
+#: The fourth integer is the scratch row in which derivatives of the column are summed.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -417,15 +397,13 @@ class Program:
 
     @cached_property
     def lists(self) -> tuple[list[int], list[Number]]:
-        """Python lists of `words` and `constants`, which the recursion reads if it is not compiled."""
+        """Python lists of `words` and `constants`, for the recursion in Python."""
         words: list[int] = self.words.tolist()
         return words, list(map(Number, self.constants.tolist()))
 
 
 def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
-    """Return the program for the frames of a compiled tree.
-
-    The compiled tree stores the program for later calls.
+    """Return the program for the frames of a compiled tree, which stores the program for later calls.
 
     Args:
         plan: The compiled tree.
@@ -491,7 +469,7 @@ class _Writer:
                     c += 1
                 self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
-                now = -2  # the registers now contain the state of the frame, not of a joint
+                now = -2  # The registers now contain the state of the frame, not of a joint.
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
         """Yield the moving joints and frames in the order in which the recursion visits them.
@@ -528,10 +506,7 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write the instructions for a translation by p and a rotation by R.
-
-        Return False if no instruction is needed, that is, if p is zero and R is the identity.
-        """
+        """Write the instructions for a translation by p and a rotation by R; return whether any is needed."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -543,18 +518,12 @@ class _Writer:
         return len(self.code) > before
 
     def _rule(self, i: int) -> int:
-        """Store a mimic joint's multiplier and offset in `constants`, and return the index of the multiplier.
-
-        For other joints, return 0.
-        """
+        """Store a mimic joint's multiplier and offset, and return their index; 0 for other joints."""
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
 
     def _angles(self) -> list[int]:
-        """Return the list of joint angles.
-
-        Each angle of a revolute or planar joint is described by `ANGLE_WIDTH` integers.
-        """
+        """Return the list of joint angles, with `ANGLE_WIDTH` integers for each."""
         angles = []
         for i, step in enumerate(self.plan.steps):
             kind, q = Motion(step[Step.KIND]), self.q + int(step[Step.Q])
@@ -575,10 +544,7 @@ class _Writer:
         self._put(op, first, int(step[Step.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
 
     def _frame(self, f: int) -> bool:
-        """Add the instructions for the results of a frame to the program.
-
-        Return True if these instructions overwrite the joint's state in the registers with the frame's state.
-        """
+        """Add the instructions for a frame's results; return whether they overwrite the joint's state."""
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
         sources = 0
@@ -600,16 +566,12 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """Return the index of the scratch memory row of each element of the frame's (6, nv) matrix.
-
-        The argument `row` is the scratch memory row of the first column.
-        """
+        """Return the scratch memory row of each element of the frame's (6, nv) matrix, from `row` on."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
             sources[:, plan.columns[c, Column.V]] = row + COLUMN_ROWS * c + np.arange(6)
-        found: list[int] = sources.ravel().tolist()
-        return found
+        return sources.ravel().tolist()
 
     def _pairs(self, f: int) -> list[int]:
         """Return the list of Jacobian columns from which the kernel computes a frame's Hessian.
@@ -625,34 +587,26 @@ class _Writer:
 
 
 def _is_rotation_about(R: FloatArray, axis: int) -> bool:
-    """Return whether R is exactly a rotation about the coordinate axis with this index."""
     one = np.eye(3)[axis]
     return bool((R[axis] == one).all() and (R[:, axis] == one).all())
 
 
 def _blocks(places: Sequence[int]) -> list[int]:
-    """Return the first index of each block of eight that contains one of the given indices.
-
-    For example, the indices 3 and 17 are in the blocks that begin at 0 and 16.
-    """
+    """Return the first index of each block of eight that contains one of the given indices."""
     return sorted({int(place) // 8 * 8 for place in places})
 
 
-#: Size of a cache line of the processor, bytes. If a vector is partly in one cache line and partly in the
-#: next, access to the vector takes twice as long.
+#: A cache line of the processor has this number of bytes.
+#: If a vector is partly in one cache line and partly in the next, access to it takes twice as long.
 _LINE = 64
-#: The reference frames that the kernels support, with the integers that represent them in a kernel. Any other
-#: reference frame raises a KeyError.
+#: A kernel represents the reference frames by these integers; another frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
 
 
 class KernelArgs(IntEnum):
-    """Indices of the integers with which a kernel is called.
-
-    The integers from CORE on are used only for calls with one configuration.
-    """
+    """Indices of the integers of a kernel; those from CORE on are only for calls with one configuration."""
 
     @staticmethod
     def _generate_next_value_(name: str, start: int, count: int, last_values: list[int]) -> int:
@@ -668,8 +622,7 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: Number of doubles from the first number of a configuration to the first number of the next one. This
-    #: number is 0 if all configurations use the same numbers.
+    #: A stride is the number of doubles between two configurations; 0 if all use the same numbers.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
@@ -677,8 +630,7 @@ class KernelArgs(IntEnum):
     OUT = auto()
     #: Number of output numbers for one configuration.
     WIDTH = auto()
-    #: Address of a buffer that collects the results of a block before they are written to the output.
-    #: The address is 0 if the results are written directly.
+    #: The buffer at this address collects a block's results before they are written; 0 means no buffer.
     STAGE = auto()
 
     CORE = auto()

@@ -25,22 +25,22 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Limits (s) of the time for computations without a kernel.
+#: These limits (s) apply to the time of computations without a kernel.
 #: Above the first limit, Numba is imported and the kernel is read from disk.
 #: Above the second limit, this process compiles a kernel that is not on disk.
 LOADING, COMPILING = 0.3, 3.0
-#: When computing without a kernel has taken this many seconds, a second process compiles the kernel.
+#: After this many seconds of computing without a kernel, a second process compiles the kernel.
 BESIDE = 1.0
-#: Limit (s) that is used instead of `LOADING` after the first kernel is loaded.
+#: After the first kernel is loaded, this limit (s) is used instead of `LOADING`.
 _LOADING_MORE = 0.03
-#: Seconds that the fast function saves for each call with one configuration.
+#: The fast function saves this time (s) for each call with one configuration.
 _SAVED = 5e-5
-#: Seconds after which the cache folder is searched again for a kernel that it did not contain.
+#: After this time (s), the cache folder is searched again for a missing kernel.
 _AGAIN = 0.05
 
-#: Modules that contain the kernels. `load_kernels` compiles the kernels `_ONE_HALF` in one process and the
-#: kernels `_OTHER_HALF` in another process. The compile times of these two groups are about equal.
+#: Modules that contain the kernels.
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
+#: One process compiles `_ONE_HALF`, another `_OTHER_HALF`; the compile times are about equal.
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -74,12 +74,9 @@ def spend(name: str, seconds: float) -> None:
 
 
 def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
-    """Return a kernel, or None if computing without the kernel is faster than loading or compiling it.
+    """Return a kernel of the module `home`, or None if computing without the kernel is faster.
 
-    Args:
-        name: Name of the kernel.
-        more: Estimated time (seconds) of the next computations if they do not use the kernel.
-        home: Module of the kernel.
+    `more` is the estimated time (seconds) of the next computations if they do not use the kernel.
     """
     if _only and _only[-1] == "interpreted":
         return None
@@ -98,8 +95,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 def single_pays(name: str) -> bool:
     """Return whether to load the fast function (`SINGLE`) that calls the kernel `name` for one configuration.
 
-    Call this function once for each call of the user: it adds up the time that the fast function would have
-    saved.
+    Each call adds up the time that the fast function would have saved.
     """
     if _only:
         return _only[-1] == "compiled"
@@ -120,10 +116,7 @@ def load(name: str, home: str = RECURSIONS) -> Any:
 
 
 def _on_disk(name: str) -> bool:
-    """Return whether a kernel is on disk.
-
-    If a kernel is missing, the next search in the cache folder begins `_AGAIN` seconds later at the earliest.
-    """
+    """Return whether a kernel is on disk; a missing kernel is searched again after `_AGAIN` seconds."""
     folder = cache_folder()
     if folder is None or time.monotonic() < _absent.get((folder, name), 0.0):
         return False
@@ -135,8 +128,7 @@ def _on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: Code that ends the second process when this process ends. The standard input of the second process closes
-#: at that moment.
+#: This code ends the second process when its standard input closes, that is, when this process ends.
 _UNTIL_CLOSED = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"
@@ -160,10 +152,7 @@ def _compile_beside(name: str, home: str) -> bool:
 
 
 def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
-    """Start a second interpreter that compiles kernels.
-
-    If it fails, this process compiles the missing kernels.
-    """
+    """Start a second interpreter that compiles kernels; if it fails, this process compiles them."""
     import subprocess  # noqa: PLC0415
 
     from urdfkin.system.processes import own_python  # noqa: PLC0415
@@ -216,11 +205,10 @@ def are_on_disk() -> bool:
 
 
 def load_kernels() -> None:
-    """Compile every kernel, or read it from disk.
+    """Compile every kernel, or read it from disk, before several processes need the kernels.
 
-    Call this function before you start several processes; otherwise each of them compiles the kernels. A
-    process compiles on one processor only. Therefore, a second process compiles half of the kernels.
-    Afterwards, this process reads those kernels from disk.
+    Otherwise each of them would compile the kernels. A process compiles on one processor only, so a second
+    process compiles half of the kernels, and this process reads them from disk.
     """
     missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
     helper = _compile_elsewhere(_OTHER_HALF) if missing else None

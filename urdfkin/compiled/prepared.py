@@ -1,9 +1,7 @@
 """Compute results of one frame for one configuration in fast calls, for control loops and solvers.
 
-The recursion is the same as for the methods of `Robot`. A kernel computes eight configurations at a time;
-here, all eight are the same configuration. Each function has its own program and its own scratch memory, so
-the caller passes only the arrays. If another thread is using the function, `Robot` computes the same result
-instead.
+Each function has its own program and its own scratch memory, so the caller passes only the arrays. If another
+thread is using the function, `Robot` computes the same result instead.
 """
 
 from __future__ import annotations
@@ -23,9 +21,9 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
-#: A function of joint coordinates, which is called as f(q, out), f(q, v, out) or f(q, v, a, out). The
-#: function returns the result, or None for arguments that it does not support. If it returns None, `Robot`
-#: computes the result or raises the error.
+#: A fast function is called as f(q, out), f(q, v, out) or f(q, v, a, out).
+#: It returns the result, or None for arguments that it does not support.
+#: If it returns None, `Robot` computes the result or raises the error.
 Fast = Callable[..., FloatArray | None]
 
 
@@ -83,8 +81,7 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether the user created this object with `Robot.prepare`. For such an object, the first call
-        #: compiles machine code.
+        #: Whether `Robot.prepare` created this object; its first call then compiles machine code.
         self.wanted = False
         # At the first call of a quantity, `_first` replaces the quantity's attribute by a compiled function.
         self._placement: Fast = partial(self._first, "placement")
@@ -94,7 +91,7 @@ class PreparedFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
-        # The object contains addresses of this process, so a copy is created by `Robot.prepare`.
+        # The object contains addresses of this process, so `Robot.prepare` creates the copy.
         return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
 
     # The fast functions record in the ledger whether each result was checked.
@@ -148,9 +145,9 @@ class PreparedFrame:
         return self._robot.hessian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def acceleration(self, q: Given, v: Given, a: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the classical acceleration (6,), [linear; angular], m/s^2 and rad/s^2, by eq.
+        """Return the classical acceleration (6,), m/s^2 and rad/s^2, by eq. 7.129 and 7.130.
 
-        7.129 and 7.130.
+        The six numbers are [linear; angular].
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")
@@ -164,12 +161,8 @@ class PreparedFrame:
         )
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
-        """Create the fast function of a quantity and call it.
-
-        Return None if the function would save less time than its creation takes.
-        """
-        # The fast function neither normalises quaternions nor checks for overflow, so `Robot` computes these
-        # cases.
+        """Create the fast function of a quantity and call it; return None if this does not save time."""
+        # The fast function does not normalise quaternions or check for overflow; `Robot` does.
         robots = self._robot.tree.floating_joints or self._plan.is_large
         if robots or not (isinstance(q, np.ndarray) and q.ndim == 1):
             return None
@@ -188,5 +181,5 @@ class PreparedFrame:
             verifier.ledger.account(quantity).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{quantity}", compute)
         if (found := compute(q, *others)) is not None and not self.verify:
-            warn_of_degrees(self._robot.tree, q)  # for the first configuration only: later calls skip this
+            warn_of_degrees(self._robot.tree, q)  # Later calls skip this check.
         return found

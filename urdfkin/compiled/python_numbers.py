@@ -1,12 +1,8 @@
 """Number types for one configuration, with which the recursion runs in Python without compilation.
 
-Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`). A
-product x y is not computed at once. In the sum x y + z, the product and the sum are one fused multiply-add,
-which is rounded only once. `zero()` and `one()` are the constants 0 and 1. `nothing()` stands for a number
-that is not needed. Every number computed from `nothing()` is also `nothing()`.
-
-Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel takes
-addresses.
+Results are exactly the same doubles as those of compiled kernels; `urdfkin.compiled.machine.numbers` explains
+the types. Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel
+takes addresses.
 """
 
 from __future__ import annotations
@@ -16,15 +12,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows. For N
-#: joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2. An angular
-#: velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
+#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows.
+#: For N joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2.
+#: An angular velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: If this constant is added to a number below 2^51, the sum is rounded to an integer. The lowest bits of the
-#: sum's mantissa are the integer nearest to the number.
+#: If this constant is added to a number below 2^51, the sum is rounded to an integer.
+#: The lowest bits of the sum's mantissa are the integer nearest to the number.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -48,8 +44,7 @@ def _c_fma() -> Callable[[float, float, float], float]:
     """Return the fused multiply-add of the C library, which the Python interpreter has already loaded."""
     function = ctypes.PyDLL(None).fma
     function.restype, function.argtypes = ctypes.c_double, (ctypes.c_double,) * 3
-    result: Callable[[float, float, float], float] = function
-    return result
+    return function
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
@@ -69,8 +64,6 @@ fma = _python_fma(math.fma, _c_fma()) if hasattr(math, "fma") else _c_fma()
 
 
 class Number:
-    """A number that is one double."""
-
     __slots__ = ("x",)
 
     def __init__(self, x: float) -> None:
@@ -154,10 +147,7 @@ class Product:
 
 
 class Known:
-    """A number that simplifies products: the constant 0, the constant 1, or the unused number `nothing()`.
-
-    The attribute `value` of the unused number is None.
-    """
+    """The constant 0, the constant 1, or the unused number `nothing()`, whose `value` is None."""
 
     __slots__ = ("value",)
 
@@ -190,30 +180,22 @@ class Known:
 
 
 def _double(x: Any) -> float:
-    """Return a number as a float.
-
-    The factors of a `Product` are multiplied. The number must not be `nothing()`.
-    """
+    """Return a number, which must not be `nothing()`, as a float."""
     if type(x) is Product:
-        product: float = x.x * x.y
-        return product
-    double: float = x.x if type(x) is Number else float((x.value or 0) if type(x) is Known else x)
-    return double
+        return x.x * x.y
+    return x.x if type(x) is Number else float((x.value or 0) if type(x) is Known else x)
 
 
 _ZERO, _ONE, _NOTHING = Known(0), Known(1), Known(None)
 
 
 def zero() -> Known:
-    """Return the constant 0.
-
-    Products and sums with this constant are simplified: 0 x is 0, and 0 + x is x.
-    """
+    """Return the constant 0, which simplifies products and sums: 0 x is 0, and 0 + x is x."""
     return _ZERO
 
 
 def one() -> Known:
-    """Return the constant 1. Products with this constant are simplified: 1 x is x."""
+    """Return the constant 1, which simplifies products: 1 x is x."""
     return _ONE
 
 
@@ -231,26 +213,21 @@ def rounded(x: Any) -> Any:
 
 
 def number(s: Sequence[Number], row: int) -> Number:
-    """Return the number in a row of scratch memory."""
     return s[row]
 
 
 def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
-    """Return the number in a row of scratch memory, or `nothing()` if the caller does not need the number.
-
-    The caller then passes `nothing()` as the argument `wanted`.
-    """
+    """Return the number in a row of scratch memory, or `nothing()` if `wanted` is `nothing()`."""
     return wanted if wanted is _NOTHING else s[row]
 
 
 def put(s: list[Number], row: int, x: Any) -> None:
-    """Write a number to a row of scratch memory; if the number is `nothing()`, do not change the row."""
+    """Write a number to a row of scratch memory; `nothing()` does not change the row."""
     if x is not _NOTHING:
         s[row] = x if type(x) is Number else Number(_double(x))
 
 
 def constant(g: Sequence[Number], i: int) -> Number:
-    """Return element i of the constants g as a number."""
     return g[i]
 
 
@@ -281,10 +258,7 @@ def read_rows(
 def write_rows(
     m: int, s: Sequence[Number], rows: Sequence[int], first: int, count: int, to: list[float], at: int, _: int
 ) -> None:
-    """Write `count` rows of scratch memory to the list `to`, from `to[at]` on.
-
-    The indices of these rows are `rows[first]`, `rows[first + 1]` and so on.
-    """
+    """Write the scratch rows `rows[first]`, `rows[first + 1]`, ... to `count` numbers from `to[at]`."""
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
 

@@ -8,15 +8,9 @@ The state of a link consists of:
 | w, vel | angular velocity, velocity of the origin | world or link axes, as `axes` selects |
 | alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
-The recursion expresses vectors in the axes of the requested result: world axes or the link's own axes. A
-rotation of the result at the end would add rounding errors. The equations are in the module
-`urdfkin.kinematics.equations`. They have the same form in world axes and in a link's own axes.
-
-For example, a placement does not need velocities: an unused vector is `nothing()` and costs no time.
-
-This module and the modules `axes`, `outputs` and `recursions` contain plain functions that compute with the
-module `python_numbers`. The kernels are copies of these functions for Numba's number types
-(`urdfkin.compiled.machine.kernels`).
+A vector that a result does not need is `nothing()` and costs no time. This module and the modules `axes`,
+`outputs` and `recursions` contain plain functions that compute with the module `python_numbers`. The kernels
+are copies of these functions for Numba's number types (`urdfkin.compiled.machine.kernels`).
 """
 
 from __future__ import annotations
@@ -91,10 +85,7 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return the state of a link after the axes of the link's frame are rotated by S.
-
-    The link's motion does not change.
-    """
+    """Return the state of a link after the axes of its frame are rotated by S; its motion does not change."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -107,18 +98,12 @@ def turned(axes, state, S):
 
 
 def _turned_about_z(axes, state, s, row):
-    """Rotate the frame about z by a joint's angle (7.5).
-
-    The sine of the angle is in the scratch row `row`, and the cosine is in the row after it.
-    """
+    """Rotate the frame about z (7.5); the sine and cosine are in the scratch rows `row` and `row + 1`."""
     return turned(axes, state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
 
 
 def revolute(axes, state, s, row, v, a):
-    """Compute the state after a revolute joint.
-
-    Equation 7.129 is applied first, then 7.127, then the rotation of the frame.
-    """
+    """Compute the state after a revolute joint: 7.129, then 7.127, then the rotation of the frame."""
     R, p, w, vel, alpha, acc = state
     z = seen(axes, R, (zero(), zero(), one()))
     alpha = eq.angular_acceleration(alpha, w, z, v, a)
@@ -126,10 +111,7 @@ def revolute(axes, state, s, row, v, a):
 
 
 def prismatic(axes, state, slide, v, a):
-    """Compute the state after a prismatic joint.
-
-    The position follows from 7.64, the acceleration from 7.130, and the velocity from 7.128.
-    """
+    """Compute the state after a prismatic joint: position 7.64, acceleration 7.130, velocity 7.128."""
     R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
     z = seen(axes, R, (zero(), zero(), one()))
     return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
@@ -172,10 +154,7 @@ def _rate(wanted, s, row, g, c, follows):
 
 
 def _vector_if(wanted, s, row):
-    """Return the numbers of three consecutive scratch rows as a vector.
-
-    If `wanted` is `nothing()`, the result is `nothing()`.
-    """
+    """Return the vector in three consecutive scratch rows, or `nothing()` if `wanted` is `nothing()`."""
     return number_if(wanted[0], s, row), number_if(wanted[1], s, row + 1), number_if(wanted[2], s, row + 2)
 
 
@@ -243,7 +222,7 @@ def _save(s, row, state):
 
 
 def _resume(s, row, state):
-    """Read a link's state from scratch memory; read only the vectors that are needed."""
+    """Read the needed vectors of a link's state from scratch memory."""
     R, p, w, vel, alpha, acc = state
     return (
         (_vector_if(R[0], s, row), _vector_if(R[1], s, row + 3), _vector_if(R[2], s, row + 6)),
@@ -261,12 +240,11 @@ def _resume(s, row, state):
 def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read numbers of `m` configurations from x into scratch memory; the first configuration has index b.
 
-    A configuration consists of blocks of eight numbers, and only the listed blocks are read.
-
-    If x has one row, all configurations use this row. A block of eight numbers is read faster than a shorter
-    block. If a configuration ends within a block, numbers of the next configuration are therefore read too,
-    unless they are beyond the end of x. The scratch rows with these surplus numbers are overwritten when
-    later inputs are read.
+    A configuration consists of blocks of eight numbers, and only the listed blocks are read. If x has one
+    row, all configurations use this row. A block of eight numbers is read faster than a shorter block. If a
+    configuration ends within a block, numbers of the next configuration are therefore read too, unless they
+    are beyond the end of x. The scratch rows with these surplus numbers are overwritten when later inputs are
+    read.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -277,10 +255,7 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
 
 
 def _start(axes, m, s, task, row, b):
-    """Return the initial state of the recursion, which is the base's motion in the world.
-
-    The textbook calls the base frame 0 and the world frame -1.
-    """
+    """Return the base's motion in the world; the textbook calls the base frame 0 and the world frame -1."""
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil
@@ -294,10 +269,7 @@ def _start(axes, m, s, task, row, b):
 
 
 def _sines_and_cosines(s, program, g):
-    """Compute the sines and cosines of all joint angles.
-
-    This is done before the recursion, because the recursion needs all registers.
-    """
+    """Compute the sines and cosines of all joint angles first: the recursion needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
@@ -364,10 +336,7 @@ def _read_inputs(m, task, program, s, b, orders):
 
 
 def _squares(total, m, task, program, b, orders):
-    """Add the squares of all inputs of a block to `total`.
-
-    Inputs that the recursion does not need are added too.
-    """
+    """Add the squares of all inputs of a block, also those that the recursion does not need, to `total`."""
     total = _added(total, m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
     if orders > 1:
         total = _added(total, m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])
@@ -388,8 +357,7 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
     at, stage = program[_CODE], task[_STAGE]
     to, first = (numbers_at(stage), 0) if stage else (numbers_at(task[_OUT]), b)
     if task[_BASE] == 0 and _CARRY_X <= program[at] <= _CARRY:
-        # The base is at rest at the world's origin, so the first translation changes the position but no
-        # velocity.
+        # The base is at rest at the world's origin, so the first translation changes only the position.
         state = _shifted(state, _vector(g, program[at + 4]))
         at += WIDTH
     while program[at] != _END:
@@ -415,9 +383,7 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
 
 
 def forward_recursion(address, axes, orders, follow, keep, column, emit):
-    """Execute a program for every block of configurations.
-
-    The result is 1 if an input is nan, infinite or too large, else 0.
+    """Execute a program for every block; return 1 if an input is nan, infinite or too large, else 0.
 
     Args:
         address: Address of the kernel's arguments (`KernelArgs`).
@@ -436,7 +402,7 @@ def forward_recursion(address, axes, orders, follow, keep, column, emit):
     m = LANES if n >= LANES else 1
     total = same(0.0)
     for first in range(0, n, m):
-        b = min(first, n - m)  # the last block may overlap the block before it
+        b = min(first, n - m)  # The last block may overlap the block before it.
         total = _squares(total, m, task, program, b, orders)
         _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
     if task[_STAGE]:

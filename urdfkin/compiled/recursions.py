@@ -1,11 +1,7 @@
-"""The recursions, one function for each quantity.
+"""The recursions, one function for each quantity, as plain Python or as compiled kernels of the same names.
 
-The argument of a function is the address of the integers that `KernelArgs` describes. The function returns 1
-if an input is nan, infinite or too large, else 0.
-
-Python can run these functions without a compiler. The functions then take lists instead of addresses. The
-module `urdfkin.compiled.machine.kernels` contains compiled kernels with the same names. A compiled kernel
-computes eight configurations at a time, with exactly the same results.
+The argument of a kernel is the address of the integers that `KernelArgs` describes; Python takes lists
+instead of addresses. The result is 1 if an input is nan, infinite or too large, else 0.
 """
 
 from __future__ import annotations
@@ -71,10 +67,7 @@ def jacobian_rates(task):
 
 
 def hessians(task):
-    """Compute the derivative of each Jacobian column (7.85) with respect to each joint's motion.
-
-    The kernel is compiled only when it is needed.
-    """
+    """Compute the derivative of each Jacobian column (7.85) with respect to each joint's motion."""
     return forward_recursion(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_pairs)
 
 

@@ -1,9 +1,7 @@
 """Copies of the equations that use different basic operations, for example for NumPy arrays or LaTeX.
 
-The functions of `urdfkin.kinematics.equations` compute with vectors that are triples of numbers. `bound`
-copies these functions and replaces their basic operations, such as `plus` and `cross`. With suitable
-operations, the copies compute with NumPy arrays, write LaTeX, or compute bounds on the lengths of vectors.
-This module does not import NumPy.
+The functions of `urdfkin.kinematics.equations` compute with vectors that are triples of numbers. Their copies
+compute with NumPy arrays, write LaTeX, or compute bounds. This module does not import NumPy.
 """
 
 from __future__ import annotations
@@ -14,7 +12,7 @@ from typing import Any
 
 from urdfkin.kinematics import equations
 
-#: The basic operations on vectors. All other functions are composed of them.
+#: All other functions are composed of these basic operations on vectors.
 VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
 
 
@@ -23,9 +21,7 @@ def bound(
 ) -> SimpleNamespace:
     """Return a namespace with a copy of each function of `equations`; the copies use other basic operations.
 
-    Args:
-        made: A decorator that is applied to each copied function, for example the decorator of a compiler.
-        vectors: Basic operations, by name, that replace the basic operations of `equations`.
+    Each copy passes through the decorator `made`. `vectors` are the basic operations by name.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -39,12 +35,9 @@ def rebound(
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    A copy calls other copies instead of the original functions.
-
-    Args:
-        modules: The modules. A module may use functions of the modules that are listed before it.
-        made: A decorator that is applied to each copied function, for example the decorator of a compiler.
-        others: Replacements, by name, for functions and modules that a module imports or defines.
+    A copy calls other copies instead of the original functions, and those of `others` instead of functions or
+    modules of the same name. Each copy passes through the decorator `made`, for example that of a compiler. A
+    module may use functions of the modules that are listed before it.
     """
     copies: dict[str, Any] = {}
     for module in modules:

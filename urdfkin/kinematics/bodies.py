@@ -10,16 +10,20 @@
 | the analytical Jacobian | 7.5 | 7.116 to 7.122 |
 
 `p_1`, `v_1` and `a_1` are position, velocity and acceleration of a point as an observer in frame 1 measures
-them, expressed in frame 1. Results are relative to frame 0 and expressed in frame 0. Six-vectors are [linear;
-angular]. `z` is a joint's axis z_{i-1} in frame 0; `turns` is True for a rotary joint and False for a
-prismatic one.
+them, expressed in frame 1. Results are relative to frame 0 and expressed in frame 0. Vectors are (..., 3),
+rotations (..., 3, 3), angles and rates (...), with any leading batch shape. Six-vectors (..., 6) are [linear;
+angular]. Units are metres, radians and seconds. `z` is a joint's unit axis z_{i-1} in frame 0; `turns` is
+True for a rotary joint and False for a prismatic one; `rate` is the joint's velocity.
 
-There are two Jacobians; the textbook warns that they are often confused. The velocity Jacobian J_v gives the
-linear and the angular velocity. The manipulator (or analytical) Jacobian J gives the time derivatives of
-x = (position, orientation). The orientation is either three Euler angles in any sequence (the textbook uses
-"ZYZ") or a unit quaternion ("quaternion").
+There are two Jacobians; the textbook warns that they are often confused. The velocity Jacobian J_v (..., 6,
+n) gives the linear and the angular velocity. The manipulator (or analytical) Jacobian J gives the time
+derivatives of x = (position, orientation). For three Euler angles in any sequence (the textbook uses "ZYZ"),
+J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), J is (..., 7, n).
 
-Every function accepts any leading batch shape.
+Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
+raise it for an axis that is not of unit length and for a matrix that is not a rotation. An unknown
+`representation` raises UnknownNameError. Near the singularity of Euler angles, Omega cannot be inverted. If
+the distance is `nearest` radians or less, RepresentationSingularityError with this distance is raised.
 """
 
 from __future__ import annotations
@@ -47,16 +51,7 @@ from urdfkin.kinematics.rotation import (
 class MovingFrame:
     """Pose, velocity and acceleration of frame 1 relative to frame 0, expressed in frame 0.
 
-    Attributes:
-        R_0_1: (..., 3, 3) orientation.
-        d_0_1: (..., 3) interorigin vector from O_0 to O_1, metres.
-        w_0_1: (..., 3) angular velocity, rad/s.
-        v_0_1: (..., 3) time derivative of `d_0_1`, m/s.
-        alpha_0_1: (..., 3) angular acceleration, rad/s^2.
-        a_0_1: (..., 3) time derivative of `v_0_1`, m/s^2.
-
-    Raises:
-        InputError: a wrong shape, a value that is not finite, or `R_0_1` is not a rotation.
+    `d_0_1` is the interorigin vector from O_0 to O_1; `v_0_1` and `a_0_1` are its time derivatives.
     """
 
     R_0_1: FloatArray
@@ -74,32 +69,18 @@ class MovingFrame:
             object.__setattr__(self, entry.name, array)
 
 
-def turned(R: FloatArray, p: FloatArray) -> FloatArray:
-    """Return R p for R (..., 3, 3) and p (..., 3)."""
-    return (R @ p[..., np.newaxis])[..., 0]
-
-
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
 
-    The motion is computed from the motion of frame 1 relative to frame 0 and the motion of frame 2 relative
-    to frame 1.
+    `inner` is the motion of frame 2 relative to frame 1, expressed in frame 1.
 
     The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. The
     angular velocity of frame 2 is w_01 + w_12 (7.49). The angular acceleration is the time derivative of w_01
     + w_12, which contains the term w_01 x w_12.
-
-    Args:
-        outer: Motion of frame 1 relative to frame 0.
-        inner: Motion of frame 2 relative to frame 1, expressed in frame 1. In this argument, for
-            example, `d_0_1` is the vector from O_1 to O_2.
-
-    Returns:
-        Motion of frame 2 relative to frame 0.
     """
     R, w = outer.R_0_1, outer.w_0_1
-    d_12, v_12, a_12 = (turned(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
-    w_12, alpha_12 = turned(R, inner.w_0_1), turned(R, inner.alpha_0_1)
+    d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
+    w_12, alpha_12 = eq.rotate(R, inner.w_0_1), eq.rotate(R, inner.alpha_0_1)
     return MovingFrame(
         R @ inner.R_0_1,
         outer.d_0_1 + d_12,
@@ -111,31 +92,19 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 
 
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
-    """Return the motion of the last frame relative to frame 0.
+    """Return the motion of the last frame relative to frame 0 (7.50, 7.61).
 
-    The motion of each frame is given relative to the previous frame.
-
-    The equations are 7.50 and 7.61.
-
-    Args:
-        frames: Motion of frame i + 1 relative to frame i, for i = 0, 1, ... If there are no frames, the
-            result is the motion of frame 0 relative to itself.
-
-    Returns:
-        Motion of the last frame relative to frame 0.
+    Entry i is the motion of frame i + 1 relative to frame i. Without frames, the result is no motion.
     """
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
 
 
 def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
-    """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), the pose of frame 2 in frame 1 (7.77).
-
-    The poses of frames 1 and 2 are given in frame 0.
-    """
+    """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), the pose of frame 2 in frame 1 (7.77)."""
     T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
     back = T_0_1[..., :3, :3].swapaxes(-1, -2)
     T[..., :3, :3] = back @ T_0_2[..., :3, :3]
-    T[..., :3, 3] = turned(back, T_0_2[..., :3, 3] - T_0_1[..., :3, 3])
+    T[..., :3, 3] = eq.rotate(back, T_0_2[..., :3, 3] - T_0_1[..., :3, 3])
     T[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
     return T
 
@@ -159,7 +128,6 @@ class VelocityParts:
 
     @property
     def total(self) -> FloatArray:
-        """The sum of the terms."""
         return self.rotation + self.relative + self.origin
 
 
@@ -183,44 +151,20 @@ class AccelerationParts:
 
     @property
     def total(self) -> FloatArray:
-        """The sum of the terms."""
         return self.transverse + self.centripetal + self.coriolis + self.relative + self.origin
 
 
 def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
-    """Return p_0 = d_01 + R p_1 (7.58).
-
-    Args:
-        frame: Frame 1 in frame 0.
-        p_1: (..., 3) position of the point in frame 1, metres.
-
-    Returns:
-        (..., 3) position of the point in frame 0, metres.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return p_0 = d_01 + R p_1 (7.58)."""
     p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, vectors(p_1, "p_1"))
     return p_0
 
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
-    """Return p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if the point is fixed in frame 1).
-
-    Args:
-        frame: Frame 1 in frame 0.
-        p_1: (..., 3) position of the point in frame 1, metres.
-        v_1: (..., 3) velocity of the point in frame 1, m/s; by default 0.
-
-    Returns:
-        The terms; `.total` is the velocity, (..., 3) m/s in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-    """
-    p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
+    """Return p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if the point is fixed in frame 1)."""
+    p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
-    relative = turned(frame.R_0_1, vectors(v_1, "v_1"))
+    relative = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
     return VelocityParts(*np.broadcast_arrays(rotation, relative, frame.v_0_1))
 
 
@@ -230,22 +174,10 @@ def point_acceleration(
     """Return p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
 
     For a point that is fixed in frame 1, the result is equation 7.123.
-
-    Args:
-        frame: Frame 1 in frame 0.
-        p_1: (..., 3) position of the point in frame 1, metres.
-        v_1: (..., 3) velocity of the point in frame 1, m/s; by default 0.
-        a_1: (..., 3) acceleration of the point in frame 1, m/s^2; by default 0.
-
-    Returns:
-        The terms; `.total` is the acceleration, (..., 3) m/s^2 in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
     """
-    p_0 = turned(frame.R_0_1, vectors(p_1, "p_1"))
-    v_0 = turned(frame.R_0_1, vectors(v_1, "v_1"))
-    a_0 = turned(frame.R_0_1, vectors(a_1, "a_1"))
+    p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
+    v_0 = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
+    a_0 = eq.rotate(frame.R_0_1, vectors(a_1, "a_1"))
     transverse = eq.transverse(frame.alpha_0_1, p_0)
     centripetal, coriolis = eq.centripetal(frame.w_0_1, p_0), eq.coriolis(frame.w_0_1, v_0)
     return AccelerationParts(*np.broadcast_arrays(transverse, centripetal, coriolis, a_0, frame.a_0_1))
@@ -254,21 +186,10 @@ def point_acceleration(
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
     """Return the interorigin vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
-    Args:
-        d: (...) offset d_i along the joint's axis, metres.
-        z: (..., 3) unit axis z_{i-1}.
-        a: (...) length a_i of the common normal, metres.
-        x: (..., 3) unit vector x_i along the common normal.
+    `d` is the offset along the joint's axis, `a` the length of the common normal, and `x` its direction.
 
-    Returns:
-        (..., 3) metres, in the frame of `z` and `x`.
-
-    Raises:
-        InputError: a wrong shape, or a vector that is not of unit length.
-
-    Example:
-        >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
-        array([0.5, 0. , 0.3])
+    >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
+    array([0.5, 0. , 0.3])
     """
     vector: FloatArray = eq.interorigin_vector(
         scalars(d, "d"), unit_vectors(z, "z"), scalars(a, "a"), unit_vectors(x, "x")
@@ -277,21 +198,7 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 
 
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
-    """Return a joint's angular velocity w_{i-1,i}.
-
-    The angular velocity is theta-dot z for a rotary joint (7.62), and zero for a prismatic joint (7.63).
-
-    Args:
-        z: (..., 3) unit axis z_{i-1} in frame 0.
-        rate: (...) joint velocity, rad/s or m/s.
-        turns: Whether the joint is rotary.
-
-    Returns:
-        (..., 3) rad/s, in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
-    """
+    """Return w_{i-1,i}: theta-dot z for a rotary joint (7.62), and zero for a prismatic joint (7.63)."""
     w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
     return w if turns else np.zeros_like(w)
 
@@ -299,24 +206,9 @@ def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatA
 def interorigin_velocity(
     w_0_i: ArrayLike, d_vector: ArrayLike, z: ArrayLike, rate: ArrayLike, turns: bool
 ) -> FloatArray:
-    """Return the time derivative of an interorigin vector (7.73, 7.74).
-
-    It is d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint.
+    """Return d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint (7.73, 7.74).
 
     If only joint i moves, w_0i is w_{i-1,i}, and the equations are 7.66 and 7.67.
-
-    Args:
-        w_0_i: (..., 3) angular velocity of link i, rad/s, in frame 0.
-        d_vector: (..., 3) interorigin vector d_{i-1,i}, metres, in frame 0.
-        z: (..., 3) unit axis z_{i-1} in frame 0.
-        rate: (...) joint velocity, rad/s or m/s.
-        turns: Whether the joint is rotary.
-
-    Returns:
-        (..., 3) time derivative of the vector in frame 0, m/s.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
     """
     rotation: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
     sliding: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
@@ -324,20 +216,10 @@ def interorigin_velocity(
 
 
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
-    """Return a joint's column of the velocity Jacobian (7.80, 7.85).
+    """Return a joint's column of the velocity Jacobian, (..., 6) (7.80, 7.85).
 
-    It is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint.
-
-    Args:
-        z: (..., 3) unit axis z_{i-1} in frame 0.
-        arm: (..., 3) moment arm d_{i-1,n} from the joint's origin to the endpoint, metres, in frame 0.
-        turns: Whether the joint is rotary.
-
-    Returns:
-        (..., 6) [linear; angular], in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
+    The column is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. `arm` is d_{i-1,n},
+    the moment arm from the joint's origin to the endpoint.
     """
     z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
     linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
@@ -345,100 +227,46 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
 
 
 def planar_rotation(theta: ArrayLike) -> FloatArray:
-    """Return the rotation matrix R(theta) of the plane (7.5).
-
-    Args:
-        theta: (...) radians.
-
-    Returns:
-        (..., 2, 2) rotation; the columns are the axes x1 and y1 in frame 0.
-
-    Raises:
-        InputError: an angle is not a finite number.
-    """
+    """Return R(theta), (..., 2, 2), of the plane; its columns are the axes x1 and y1 in frame 0 (7.5)."""
     theta = scalars(theta, "theta")
     c, s = np.cos(theta), np.sin(theta)
     return np.stack((np.stack((c, -s), axis=-1), np.stack((s, c), axis=-1)), axis=-2)
 
 
 def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
-    """Return dR/dtheta of the rotation matrix in the plane (7.4, figure 7.2).
+    """Return dR/dtheta, (..., 2, 2), of the rotation matrix in the plane (7.4, figure 7.2).
 
     Its columns are y1 and -x1, which are the axes x1 and y1 turned by 90 degrees.
-
-    Args:
-        theta: (...) radians.
-
-    Returns:
-        (..., 2, 2), per radian.
-
-    Raises:
-        InputError: an angle is not a finite number.
     """
     R = planar_rotation(theta)
     return np.stack((R[..., 1], -R[..., 0]), axis=-1)
 
 
 def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link that turns about O_0 (7.1, 7.3).
+    """Return d_01 = a x1 = R a (1, 0), (..., 2), the endpoint of a link that turns about O_0 (7.1, 7.3).
 
-    Args:
-        theta: (...) joint angle, radians.
-        length: (...) link length a, metres.
-
-    Returns:
-        (..., 2) metres, in frame 0.
-
-    Raises:
-        InputError: a value is not a finite number.
-
-    Example:
-        >>> link_endpoint(np.pi / 2, 2.0).round(12)
-        array([0., 2.])
+    >>> link_endpoint(np.pi / 2, 2.0).round(12)
+    array([0., 2.])
     """
-    endpoint: FloatArray = scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
-    return endpoint
+    return scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return the velocity d-dot_01 = a theta-dot y1 of a link's endpoint (7.2, 7.4, 7.7).
+    """Return the velocity d-dot_01 = a theta-dot y1, (..., 2), of a link's endpoint (7.2, 7.4, 7.7).
 
     The velocity is tangential to the endpoint's circle, and its size is v = r w.
 
-    Args:
-        theta: (...) joint angle, radians.
-        rate: (...) joint velocity, rad/s.
-        length: (...) link length a, metres.
-
-    Returns:
-        (..., 2) m/s, in frame 0.
-
-    Raises:
-        InputError: a value is not a finite number.
-
-    Example:
-        >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
-        array([0., 6.])
+    >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
+    array([0., 6.])
     """
     speed = scalars(length, "length") * scalars(rate, "rate")
-    velocity: FloatArray = speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
-    return velocity
+    return speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
 
 
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of the tool frame from the velocity of frame n.
+    """Return the velocity (..., 6) of the tool frame from the velocity of frame n.
 
     The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}. The angular velocities are equal.
-
-    Args:
-        velocity: (..., 6) velocity of frame n, m/s and rad/s, in frame 0.
-        d_n_tool: (..., 3) vector from O_n to O_tool, metres, in frame 0.
-
-    Returns:
-        (..., 6) velocity of the tool frame, in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
     """
     velocity, d = vectors(velocity, "velocity", 6), vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
@@ -447,23 +275,12 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of frame n from the velocity of the tool frame (7.115).
+    """Return the velocity (..., 6) of frame n from the velocity of the tool frame (7.115).
 
     The linear velocity is d-dot_0n = d-dot_{0,tool} - w x d_{n,tool}. The angular velocities are equal.
 
-    Args:
-        velocity: (..., 6) velocity of the tool frame, m/s and rad/s, in frame 0.
-        d_n_tool: (..., 3) vector from O_n to O_tool, metres, in frame 0.
-
-    Returns:
-        (..., 6) velocity of frame n, in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-
-    Example:
-        >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
-        array([0., 0., 0., 0., 0., 2.])
+    >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
+    array([0., 0., 0., 0., 0., 2.])
     """
     return tool_velocity(velocity, -vectors(d_n_tool, "d_n_tool"))
 
@@ -472,40 +289,15 @@ QUATERNION = "quaternion"
 
 
 def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the Euler angles or the quaternion of a rotation.
-
-    These are the last entries of the textbook's x = (position, orientation).
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) rotation.
-
-    Returns:
-        (..., 3) angles in radians, or (..., 4) quaternion, scalar last.
-
-    Raises:
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
-    """
+    """Return the Euler angles or the quaternion of a rotation, the textbook's orientation in x."""
     return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
 
 
 def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the matrix C in [d-dot; w] = C x-dot (7.119, 7.120).
+    """Return the matrix C, (..., 6, 6 or 7), in [d-dot; w] = C x-dot (7.119, 7.120).
 
     C is block diagonal; its blocks are the identity and Omega. For a quaternion, Omega is 4 E^T (3 by 4),
     with the matrix E of 7.57.
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the end frame.
-
-    Returns:
-        (..., 6, 6), or (..., 6, 7) for a quaternion.
-
-    Raises:
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
     """
     if representation == QUATERNION:
         return _blocks(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
@@ -513,25 +305,11 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
+    """Return C^-1, (..., 6 or 7, 6), with x-dot = C^-1 [d-dot; w] (7.122).
 
     For a quaternion, C has several right inverses. The function returns the right inverse for which the
     quaternion's time derivative is perpendicular to the quaternion. The quaternion's length then stays
     constant. This right inverse has no singularity.
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the end frame.
-        nearest: Least allowed distance from the representational singularity, radians.
-
-    Returns:
-        (..., 6, 6), or (..., 7, 6) for a quaternion.
-
-    Raises:
-        RepresentationSingularityError: Euler angles of a sample are within `nearest` of the singularity,
-            where Omega cannot be inverted. The error contains the distance.
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
     """
     if representation == QUATERNION:
         return _blocks(quaternion_rate_matrix(quaternion_of(R)))
@@ -541,87 +319,29 @@ def representation_inverse(representation: str, R: ArrayLike, nearest: float = N
 def analytical_jacobian(
     representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return J = C^-1 J_v, the manipulator Jacobian (7.122).
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the end frame.
-        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in frame 0.
-        nearest: Least allowed distance from the representational singularity, radians.
-
-    Returns:
-        (..., 6, n), or (..., 7, n) for a quaternion: the derivatives of x with respect to the joint
-            coordinates.
-
-    Raises:
-        RepresentationSingularityError: see `representation_inverse`.
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
-    """
-    J: FloatArray = representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
-    return J
+    """Return J = C^-1 J_v, the manipulator Jacobian (7.122)."""
+    return representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
     """Return the velocity Jacobian J_v = C J from the manipulator Jacobian J (7.121).
 
     Unlike the inverse conversion, this conversion works for every orientation.
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the end frame.
-        J: (..., 6, n), or (..., 7, n) for a quaternion; the manipulator Jacobian.
-
-    Returns:
-        (..., 6, n), [linear; angular], in frame 0.
-
-    Raises:
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
     """
     C = representation_matrix(representation, R)
-    J_v: FloatArray = C @ _rows(J, "J", C.shape[-1])
-    return J_v
+    return C @ _rows(J, "J", C.shape[-1])
 
 
 def pose_rates(
     representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation.
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the frame.
-        velocity: (..., 6) [linear; angular] in frame 0, m/s and rad/s.
-        nearest: Least allowed distance from the representational singularity, radians.
-
-    Returns:
-        (..., 6), or (..., 7) for a quaternion.
-
-    Raises:
-        RepresentationSingularityError: see `representation_inverse`.
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
-    """
+    """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation."""
     column = vectors(velocity, "velocity", 6)[..., np.newaxis]
     return (representation_inverse(representation, R, nearest) @ column)[..., 0]
 
 
 def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """Return [d-dot; w] = C x-dot (7.119).
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the frame.
-        rates: (..., 6), or (..., 7) for a quaternion; the rates x-dot.
-
-    Returns:
-        (..., 6) [linear; angular] in frame 0, m/s and rad/s.
-
-    Raises:
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
-    """
+    """Return [d-dot; w] = C x-dot (7.119)."""
     C = representation_matrix(representation, R)
     column = vectors(rates, "rates", C.shape[-1])[..., np.newaxis]
     return (C @ column)[..., 0]
@@ -640,32 +360,3 @@ def _rows(value: ArrayLike, name: str, rows: int) -> FloatArray:
     array = scalars(value, name)
     columns = array.shape[-1] if array.ndim else 0
     return matrices(array, name, rows, columns)
-
-
-__all__ = [
-    "AccelerationParts",
-    "MovingFrame",
-    "VelocityParts",
-    "analytical_jacobian",
-    "compose",
-    "compose_all",
-    "frame_velocity",
-    "interorigin_vector",
-    "interorigin_velocity",
-    "jacobian_column",
-    "joint_angular_velocity",
-    "link_endpoint",
-    "link_endpoint_velocity",
-    "orientation_of",
-    "planar_rotation",
-    "planar_rotation_derivative",
-    "point_acceleration",
-    "point_position",
-    "point_velocity",
-    "pose_rates",
-    "representation_inverse",
-    "representation_matrix",
-    "tool_velocity",
-    "velocity_jacobian",
-    "velocity_of_pose_rates",
-]

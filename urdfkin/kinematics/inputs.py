@@ -1,6 +1,6 @@
 """Validation of vectors, matrices and rotations, and conversion to float64 arrays with leading batch axes.
 
-Every function accepts any leading batch shape, and arguments broadcast.
+An InputError contains the argument's name.
 """
 
 from __future__ import annotations
@@ -14,25 +14,23 @@ from urdfkin.system.lazy_import import is_a
 
 FloatArray = NDArray[np.float64]
 
-#: Largest deviation of a unit vector's norm from 1. A vector that is normalised in double precision deviates
-#: by 4e-16 at most. A vector that is typed with six digits deviates by more. A rotation about such a vector
-#: would not be a rotation matrix.
+#: A unit vector's norm deviates from 1 by this number at most.
+#: A vector that is normalised in double precision deviates by 4e-16 at most.
+#: A vector with six typed digits deviates by more; a rotation about it would not be a rotation matrix.
 UNIT_TOLERANCE = 1e-12
-#: Largest deviation of R R^T from the identity for a rotation. If the entries of R are rounded to nine
-#: decimals, each entry has an error of 5e-10 at most. R R^T then deviates by at most 1e-9 times the sum of
-#: the absolute values of a row of R. This sum is at most sqrt(3).
+#: For a rotation R, R R^T deviates from the identity by this number at most.
+#: Each entry of R has an error of 5e-10 at most if it is rounded to nine decimals.
+#: R R^T then deviates by at most 1e-9 times the sum of the absolute values of a row of R.
+#: This sum is at most sqrt(3).
 ROTATION_TOLERANCE = 2e-9
-#: Kinds of NumPy types that NumPy converts to floats without an error, although they are not real numbers:
-#: complex, bytes, text, timedelta, datetime, void.
+#: NumPy converts these kinds to floats without an error, although they are not real numbers.
+#: They are complex, bytes, text, timedelta, datetime and void.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)
 
 
 def floats(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as float64 of any shape, where NaN and inf are allowed.
-
-    Raise InputError if `value` does not consist of real numbers.
-    """
+    """Return `value` as float64 of any shape, where NaN and inf are allowed; else raise InputError."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE:
         return value
     if _is_masked(value):
@@ -50,14 +48,14 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether a number of a masked array is masked. NumPy would ignore the mask without an error."""
+    """Return whether a number is masked. NumPy would ignore the mask without an error."""
     if is_a(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 
 
 def scalars(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as finite float64 of any shape; otherwise raise InputError with the argument's name."""
+    """Return `value` as finite float64 of any shape; else raise InputError."""
     array = floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
@@ -65,10 +63,7 @@ def scalars(value: ArrayLike, name: str) -> FloatArray:
 
 
 def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
-    """Return `value` as a finite float64 array (..., size).
-
-    Otherwise raise InputError with the argument's name.
-    """
+    """Return `value` as a finite float64 array (..., size); else raise InputError."""
     array = scalars(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
@@ -76,7 +71,7 @@ def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
 
 
 def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
-    """Return `value` as finite (..., rows, columns) float64; otherwise raise InputError with `name` in it."""
+    """Return `value` as a finite float64 array (..., rows, columns); else raise InputError."""
     array = scalars(value, name)
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
@@ -84,7 +79,7 @@ def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> Fl
 
 
 def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as (..., 3) unit vectors; otherwise raise an InputError with the argument's name.
+    """Return `value` as (..., 3) unit vectors; else raise InputError.
 
     The vectors are not normalised, because normalising would hide a mistake in the caller's axis.
     """
@@ -99,7 +94,7 @@ def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
 
 
 def rotations(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as (..., 3, 3) rotations; otherwise raise InputError with the argument's name."""
+    """Return `value` as (..., 3, 3) rotations; else raise InputError."""
     array = matrices(value, name)
     defect = rotation_defect(array).max(initial=0.0)
     if defect > ROTATION_TOLERANCE:
@@ -119,13 +114,14 @@ def rotation_defect(R: FloatArray) -> FloatArray:
     The result is 0 for an exact rotation. Each caller compares the result with its own tolerance, because
     matrices are written with different numbers of digits.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # if R R^T overflows, R is not a rotation
+    with np.errstate(over="ignore", invalid="ignore"):  # If R R^T overflows, R is not a rotation.
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))
         return np.where((defect >= 0.0) & (determinant(R) > 0.0), defect, np.inf)
 
 
 def determinant(matrix: FloatArray) -> FloatArray:
     """Return the determinant of matrices (..., 3, 3), computed as the triple product of the rows."""
-    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrix, (-2, -1), (0, 1))  # np.cross takes thrice as long
+    # np.cross takes three times as long.
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrix, (-2, -1), (0, 1))
     triple: FloatArray = (b * f - c * e) * g + (c * d - a * f) * h + (a * e - b * d) * i
     return triple

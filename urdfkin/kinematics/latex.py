@@ -1,11 +1,4 @@
-"""LaTeX text of the equations.
-
-The functions of `equations` are called with LaTeX expressions instead of numbers.
-
-A `Word` is a LaTeX expression. Its attribute `kind` says whether the expression is a sum, a cross product or
-neither. A sum needs brackets inside a product, and a cross product needs brackets inside another cross
-product.
-"""
+"""LaTeX text of the equations: the functions of `equations` take LaTeX expressions instead of numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +9,7 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bound
 
-#: The textbook's symbol for each parameter name of the functions in `equations`.
+#: The textbook has these symbols for the parameter names of the functions in `equations`.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",
@@ -52,13 +45,15 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class Word:
-    """A LaTeX expression; `kind` is `_SUM`, `_CROSS`, or `_ATOM` for any other expression."""
+    """A LaTeX expression; `kind` is `_SUM`, `_CROSS`, or `_ATOM` for any other expression.
+
+    A sum needs brackets inside a product, and a cross product needs brackets inside another cross product.
+    """
 
     text: str
     kind: int = _ATOM
 
     def inside(self, kind: int) -> str:
-        """Return the text, in brackets if it is a sum, or if it is a cross product and `kind` is `_CROSS`."""
         return f"({self.text})" if self.kind >= kind else self.text
 
     def __neg__(self) -> Word:
@@ -105,10 +100,7 @@ _words = bound(
 
 
 def latex(name: str) -> str:
-    r"""Return the LaTeX text of an equation of the textbook.
-
-    Args:
-        name: Name of a function of `urdfkin.kinematics.equations`.
+    r"""Return the LaTeX text of a function of `urdfkin.kinematics.equations`.
 
     >>> print(latex("point_acceleration"))
     \ddot{d} + \dot{\omega} \times d + \omega \times (\omega \times d)

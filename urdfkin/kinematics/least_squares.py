@@ -14,15 +14,15 @@ State = TypeVar("State")
 Seen = TypeVar("Seen")
 
 _ROUNDS = 100
-#: Damping of a Gauss-Newton step, divided by the largest singular value: first, smallest and largest value.
+#: The damping is relative to the largest singular value; these are its first, smallest and largest value.
 _DAMPING, _LEAST, _MOST = 1e-3, 1e-14, 1e3
-#: Two factors for the damping: one for a step that reduces the error, and one for a step that does not.
+#: The damping is multiplied by `_EASING` if a step reduces the error, else by `_HARDER`.
 _EASING, _HARDER = 0.03, 10.0
 #: A step is slow if the error after the step is more than this fraction of the error before it.
 _SLOW = 0.99
 #: The iteration ends if a full step can reduce the squared error by at most this fraction.
 _NOTHING = 1e-13
-#: Relative rounding error (in eps) of the norm of n residuals, divided by n.
+#: The norm of n residuals has a relative rounding error of n times this number of eps.
 _ROUNDED = 4.0
 
 
@@ -39,9 +39,8 @@ def least_squares(
 
     Args:
         start: The state from which the iteration starts.
-        residuals: Returns the residuals (rows,) of a state, and intermediate results that `derivatives` uses.
-        derivatives: Returns the negative derivatives (rows, parameters) of a state's residuals with respect
-            to the parameters.
+        residuals: Returns the residuals (rows,) of a state, and intermediate results for `derivatives`.
+        derivatives: Returns the negative derivatives (rows, parameters) of the residuals.
         moved: Returns the new state after a step (parameters,) from a state.
         longest: Largest component of a step.
         patience: The iteration ends after this many slow steps; 0 means no limit.

@@ -5,14 +5,13 @@ for a point of a link: p for the position, w and vel for the angular and the lin
 acc for the angular and the linear acceleration. Each number is an upper bound on the sum of the lengths of
 all terms of the quantity.
 
-`urdfkin.verify.bounds` calls the functions of this module with NumPy arrays and with Python numbers.
-`urdfkin.verify.kernels` compiles the functions. All three variants give the same result to the last bit.
+NumPy arrays, Python numbers and the compiled copies (`urdfkin.verify.kernels`) give the same bits.
 """
 
 from urdfkin.kinematics.number_kinds import Length
 from urdfkin.kinematics.number_kinds import length_equations as eq
 
-#: The five bounds (p, w, vel, alpha, acc) of the module docstring.
+#: A state is the five bounds (p, w, vel, alpha, acc).
 State = tuple[Length, ...]
 _Z = 1.0  #: Length of a joint's axis.
 

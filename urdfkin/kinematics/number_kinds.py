@@ -41,7 +41,7 @@ array_equations = bound(
 FloatArray = NDArray[np.float64]
 
 
-#: The type of lengths: an array with a number for each configuration, or a float for a single configuration.
+#: A length is an array with a number for each configuration, or a float for a single configuration.
 Length = Any
 
 
@@ -74,8 +74,8 @@ def norm(x: FloatArray) -> FloatArray:
     return counted(np.hypot.reduce(x, axis=-1))
 
 
-#: The equations with lengths: a vector is replaced by its length, and a number by its absolute value. Each
-#: length is a Python number or an array; arrays broadcast. A unit vector has length 1.
+#: The equations with lengths: a vector is replaced by its length, and a number by its absolute value.
+#: Each length is a Python number or an array; arrays broadcast. A unit vector has length 1.
 length_equations = bound(
     plus=add,
     minus=add,

@@ -10,15 +10,17 @@
 | `quaternion_of`, `quaternion_rates` and others: unit quaternions | 7.2.5: 7.57 |
 | `axis_aligning` | 7.4 |
 
-Every function accepts any leading batch shape. `w_0_1` is the angular velocity of frame 1 relative to
-frame 0.
+Arguments and results have any leading batch shape: a vector is (..., 3), a matrix (..., 3, 3), a quaternion
+(..., 4), and an angle or a rate (...). Units are metres, radians and seconds. `R_0_1` is the orientation of
+frame 1 in frame 0, and `w_0_1` is the angular velocity of frame 1 relative to frame 0, expressed in frame 0.
+Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
+raise it for a matrix that is not a rotation, and for an axis or a quaternion whose length is not 1.
 
 A user's matrix often has only a few digits, so its columns are only approximately orthogonal. There are
 several ways to convert such a matrix to a rotation: over a quaternion, over Euler angles, or by Gram-Schmidt
 on its columns. The results differ in the last digit of the matrix. `nearest_rotation` and `polar_factor`
-return the rotation that is nearest to
-the matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the polar
-decomposition M = U H.
+return the rotation that is nearest to the matrix in the Frobenius norm. This rotation is unique: it is the
+orthogonal factor U of the polar decomposition M = U H.
 
 The textbook's joint i turns about the axis z_{i-1} of a frame. A URDF joint turns about any axis of its
 frame. `axis_aligning` returns the rotation between the two frames.
@@ -32,9 +34,10 @@ the body's own frame (`frame="body"`). Quaternion rates have no singularity. `in
 integrates the rates of a quaternion and normalises the quaternion after each step. The module does not
 integrate the angular velocity itself, because that integral is not an orientation (example 7.3).
 
-Euler angles have 24 sequences, with SciPy's names. Capital letters are axes that turn with the body: "ZYZ" is
-the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the URDF's rpy (roll, pitch, yaw). The
-functions for Euler angles express angular velocities in the fixed frame 0.
+Euler angles have 24 sequences, with SciPy's names: three letters, in the order of the angles. Capital letters
+are axes that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is
+the URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. The functions for Euler angles
+express angular velocities in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -56,20 +59,10 @@ from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, 
 def skew(w: ArrayLike) -> FloatArray:
     """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16).
 
-    Args:
-        w: (..., 3), any unit, any frame.
-
-    Returns:
-        (..., 3, 3), in the unit and frame of `w`.
-
-    Raises:
-        InputError: `w` is not (..., 3) or not finite.
-
-    Example:
-        >>> skew([0.0, 0.0, 1.0]) + 0.0
-        array([[ 0., -1.,  0.],
-               [ 1.,  0.,  0.],
-               [ 0.,  0.,  0.]])
+    >>> skew([0.0, 0.0, 1.0]) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  0.]])
     """
     w = vectors(w, "w")
     S = np.zeros((*w.shape, 3))
@@ -79,24 +72,14 @@ def skew(w: ArrayLike) -> FloatArray:
 
 
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return the vector w of a skew-symmetric matrix S = S(w), the inverse of `skew`.
+    """Return the vector w of a skew-symmetric matrix S = S(w), the inverse of `skew` (7.26, 7.37).
 
     A computed S has a small symmetric part, caused by rounding. The function removes this part: each
-    component of w is the mean of two entries, S_ij and -S_ji.
+    component of w is the mean of two entries, S_ij and -S_ji. If an entry of the symmetric part is larger
+    than `tolerance` times the largest entry of S, the function raises InputError.
 
-    Args:
-        S: (..., 3, 3).
-        tolerance: Largest allowed entry of the symmetric part, relative to the largest entry of S.
-
-    Returns:
-        (..., 3), in the unit and frame of `S`.
-
-    Raises:
-        InputError: `S` is not (..., 3, 3), not finite, or not skew-symmetric (7.26, 7.37).
-
-    Example:
-        >>> unskew(skew([1.0, 2.0, 3.0]))
-        array([1., 2., 3.])
+    >>> unskew(skew([1.0, 2.0, 3.0]))
+    array([1., 2., 3.])
     """
     S = matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -110,68 +93,41 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
 
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
-    """Return R S(w) R^T = S(R w), a skew-symmetric matrix expressed in another frame (7.46).
-
-    Args:
-        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
-        S_1: (..., 3, 3) skew-symmetric matrix of a vector in frame 1.
-
-    Returns:
-        (..., 3, 3) skew-symmetric matrix of the same vector in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or `R_0_1` is not a rotation.
-    """
+    """Return R S(w) R^T = S(R w), the skew-symmetric matrix of frame 1 expressed in frame 0 (7.46)."""
     R_0_1 = rotations(R_0_1, "R_0_1")
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: A matrix is not changed if all its entries differ from those of the nearest rotation by this number at
-#: most. It is then a rotation up to rounding.
+#: A matrix stays unchanged if each entry differs from that of the nearest rotation by this number at most.
 ROUNDED = 1e-15
 
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """Return the rotation that is nearest to a matrix M, up to rounding.
 
-    The method is one Newton step (Bjorck and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U
-    (I - 3/2 E^2). The norm |E| is 3e-9 at most. Therefore, the error of the result is 1.4e-17 at most, which
-    is an eighth of a rounding error.
-
-    Args:
-        M: (..., 3, 3), a rotation whose entries are rounded to nine decimals.
-        name: Name of the argument, for messages.
-
-    Returns:
-        (..., 3, 3).
-
-    Raises:
-        InputError: a wrong shape, or `M` is not a rotation.
+    M is a rotation whose entries are rounded to nine decimals. The method is one Newton step (Bjorck and
+    Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is 3e-9 at
+    most. Therefore, the error of the result is 1.4e-17 at most, which is an eighth of a rounding error.
     """
     M = rotations(M, name)
     defect = np.swapaxes(M, -1, -2) @ M - np.eye(3)
-    nearest: FloatArray = M - M @ (0.5 * defect)
-    return nearest
+    return M - M @ (0.5 * defect)
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a matrix that has larger errors than `nearest_rotation` allows.
+    """Return the rotation nearest to a 3 by 3 matrix whose errors may exceed those of `nearest_rotation`.
 
-    An example is a matrix that is printed with few digits.
+    The matrix, for example one that is printed with few digits, has a positive determinant.
 
-    Args:
-        M: (3, 3) matrix with a positive determinant.
-
-    Example:
-        >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
-        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
     U, _, Vt = np.linalg.svd(M)
     return np.asarray(U @ Vt)
 
 
 def axis_aligning(axis: ArrayLike) -> FloatArray:
-    """Return a rotation with `axis` as its third column.
+    """Return a rotation with `axis` as its third column; for the axis z, it is the identity.
 
     If the axis does not point down (its z component is not negative), the result is the shortest rotation
     from z to the axis. If the axis points down, the result is half a turn about x, followed by the shortest
@@ -179,20 +135,10 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
     "Building an Orthonormal Basis, Revisited", 2017). For a coordinate axis the entries are exactly 0 and
     +-1.
 
-    Args:
-        axis: (..., 3) unit axis.
-
-    Returns:
-        (..., 3, 3) rotation; the identity for the axis z.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not of unit length.
-
-    Example:
-        >>> axis_aligning([1.0, 0.0, 0.0])
-        array([[ 0.,  0.,  1.],
-               [ 0.,  1.,  0.],
-               [-1.,  0.,  0.]])
+    >>> axis_aligning([1.0, 0.0, 0.0])
+    array([[ 0.,  0.,  1.],
+           [ 0.,  1.,  0.],
+           [-1.,  0.,  0.]])
     """
     axis = unit_vectors(axis, "axis")
     x, y, z = np.moveaxis(axis, -1, 0)
@@ -201,84 +147,39 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
     first = (1.0 + sign * x * x * scale, sign * x * y * scale, -sign * x)
     second = (x * y * scale, sign + y * y * scale, -y)
     columns = [np.stack(column, axis=-1) for column in (first, second)]
-    # Adding zero turns -0 into 0, so that printed matrices are easier to read.
+    # Adding zero turns -0 into 0.
     return np.stack([*columns, axis], axis=-1) + 0.0
 
 
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
-    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42).
-
-    Args:
-        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
-        w_0_1: (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
-
-    Returns:
-        (..., 3, 3) time derivative of `R_0_1`, 1/s.
-
-    Raises:
-        InputError: a wrong shape, or `R_0_1` is not a rotation.
-    """
+    """Return the time derivative R-dot = S(w) R of a rotation matrix, in 1/s (7.38, 7.42)."""
     return skew(vectors(w_0_1, "w_0_1")) @ rotations(R_0_1, "R_0_1")
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return the angular velocity w, for which S(w) = R-dot R^T (7.38).
 
-    Equations 7.35 to 7.37 show that such a w exists.
+    Equations 7.35 to 7.37 show that such a w exists if `R_rate` is the rate of a rotation. Otherwise, the
+    function raises InputError; `tolerance` is explained in `unskew`.
 
-    Args:
-        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
-        R_rate: (..., 3, 3) time derivative of `R_0_1`, 1/s.
-        tolerance: Largest allowed entry of the symmetric part of R-dot R^T, relative to the largest entry of
-            R-dot R^T.
-
-    Returns:
-        (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
-
-    Raises:
-        InputError: a wrong shape, `R_0_1` is not a rotation, or `R_rate` is not the rate of a rotation.
-
-    Example:
-        >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-        >>> angular_velocity_of(R, rotation_rate(R, [1.0, 2.0, 3.0]))
-        array([1., 2., 3.])
+    >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> angular_velocity_of(R, rotation_rate(R, [1.0, 2.0, 3.0]))
+    array([1., 2., 3.])
     """
     R_0_1 = rotations(R_0_1, "R_0_1")
     return unskew(matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
 
 
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
-    """Return the time derivative w x p of a vector p that is fixed in a turning frame (7.39 to 7.41).
-
-    Args:
-        w_0_1: (..., 3) angular velocity of the frame, rad/s, expressed in frame 0.
-        p_0: (..., 3) vector, metres, expressed in frame 0.
-
-    Returns:
-        (..., 3) time derivative of the vector in frame 0, m/s.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return the time derivative w x p of a vector p that is fixed in a turning frame (7.39 to 7.41)."""
     return np.cross(vectors(w_0_1, "w_0_1"), vectors(p_0, "p_0"))
 
 
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
-    """Return the angular velocity w_0n of the last frame (7.43 to 7.50).
+    """Return the angular velocity w_0n of the last frame, expressed in frame 0 (7.43 to 7.50).
 
-    The result is the sum of the angular velocities of each frame relative to the previous frame, all
-    expressed in frame 0.
-
-    Args:
-        Rs: (..., n, 3, 3); entry i is the orientation of frame i + 1 in frame i.
-        ws: (..., n, 3); entry i is the angular velocity of frame i + 1 relative to frame i, rad/s, expressed
-            in frame i.
-
-    Returns:
-        (..., 3) angular velocity of frame n relative to frame 0, rad/s, expressed in frame 0.
-
-    Raises:
-        InputError: a wrong shape, different numbers n in `Rs` and `ws`, or a matrix that is not a rotation.
+    Entry i of `Rs` (..., n, 3, 3) is the orientation of frame i + 1 in frame i. Entry i of `ws` (..., n, 3)
+    is the angular velocity of frame i + 1 relative to frame i, expressed in frame i.
     """
     Rs, ws = rotations(Rs, "Rs"), vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
@@ -294,22 +195,14 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     return total
 
 
-#: Largest accepted deviation of a quaternion's norm from 1.
+#: A quaternion's norm may deviate from 1 by this number at most.
 NORM_TOLERANCE = 1e-6
 
 
 def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
-    """Return `value` as quaternions (..., 4) that are normalised to unit length, up to rounding.
+    """Return `value` as quaternions that are normalised to unit length, up to rounding.
 
-    Args:
-        value: (..., 4), scalar last.
-        name: Name of the argument, for messages.
-
-    Returns:
-        (..., 4) of unit length.
-
-    Raises:
-        InputError: a wrong shape, or a norm that differs from 1 by more than 1e-6.
+    A norm that differs from 1 by more than 1e-6 raises InputError.
     """
     quat = vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
@@ -321,17 +214,7 @@ def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
 
 
 def rotation_of(quat: ArrayLike) -> FloatArray:
-    """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion.
-
-    Args:
-        quat: (..., 4), scalar last.
-
-    Returns:
-        (..., 3, 3) rotation.
-
-    Raises:
-        InputError: a wrong shape, or a quaternion that is not of unit length.
-    """
+    """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion."""
     x, y, z, w = np.moveaxis(unit_quaternions(quat), -1, 0)
     rows = (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
@@ -346,19 +229,10 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
 
     The function uses Shepperd's method: it divides by the component with the largest absolute value, which
     avoids cancellation.
-
-    Args:
-        R: (..., 3, 3) rotation.
-
-    Returns:
-        (..., 4), scalar last.
-
-    Raises:
-        InputError: a wrong shape, or `R` is not a rotation.
     """
     R = rotations(R, "R")
-    # The entries of K = 4 q q^T are sums of entries of R (and 1 on the diagonal). Each row of K is a multiple
-    # of q, and the row with the largest diagonal entry gives q without cancellation.
+    # The entries of K = 4 q q^T are sums of entries of R (and 1 on the diagonal).
+    # Each row of K is a multiple of q; the row with the largest diagonal entry gives q without cancellation.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace
@@ -374,18 +248,7 @@ def quaternion_of(R: ArrayLike) -> FloatArray:
 
 
 def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
-    """Return the product of two quaternions, with R(left right) = R(left) R(right).
-
-    Args:
-        left: (..., 4), scalar last; any length.
-        right: (..., 4), scalar last; any length.
-
-    Returns:
-        (..., 4), scalar last.
-
-    Raises:
-        InputError: a wrong shape.
-    """
+    """Return the product of two quaternions of any length, with R(left right) = R(left) R(right)."""
     left, right = vectors(left, "left", 4), vectors(right, "right", 4)
     p, p0, q, q0 = left[..., :3], left[..., 3:], right[..., :3], right[..., 3:]
     scalar = p0 * q0 - (p * q).sum(axis=-1, keepdims=True)
@@ -393,17 +256,7 @@ def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
 
 
 def conjugate(quat: ArrayLike) -> FloatArray:
-    """Return the conjugate (-q, q0), the inverse rotation of a unit quaternion.
-
-    Args:
-        quat: (..., 4), scalar last.
-
-    Returns:
-        (..., 4), scalar last.
-
-    Raises:
-        InputError: a wrong shape.
-    """
+    """Return the conjugate (-q, q0) of a quaternion; for a unit quaternion, it is the inverse rotation."""
     conjugated: FloatArray = vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
 
@@ -412,21 +265,11 @@ ExpressedIn = Literal["fixed", "body"]
 
 
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the matrix E in (q-dot, q0-dot) = E w (7.57).
+    """Return the matrix E (..., 4, 3) in (q-dot, q0-dot) = E w (7.57).
 
     For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
     changes. The columns of E have length 1/2. The columns are perpendicular to each other and to the
     quaternion, so the quaternion's length is constant.
-
-    Args:
-        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
-        frame: Frame of `w`: "fixed" or "body".
-
-    Returns:
-        (..., 4, 3), dimensionless.
-
-    Raises:
-        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -434,27 +277,14 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
     q, q0 = quat[..., :3], quat[..., 3]
     turn = -skew(q) if frame == "fixed" else skew(q)
     top = turn + q0[..., np.newaxis, np.newaxis] * np.eye(3)
-    E: FloatArray = 0.5 * np.concatenate((top, -q[..., np.newaxis, :]), axis=-2)
-    return E
+    return 0.5 * np.concatenate((top, -q[..., np.newaxis, :]), axis=-2)
 
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
     """Return the time derivative of a body's quaternion from the body's angular velocity w (7.57).
 
-    Args:
-        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
-        w: (..., 3) angular velocity of the body, rad/s.
-        frame: Frame of `w`: "fixed" means frame 0, "body" means the body's own frame.
-
-    Returns:
-        (..., 4) rates, 1/s, scalar last.
-
-    Raises:
-        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
-
-    Example:
-        >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
-        array([0., 0., 1., 0.])
+    >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
+    array([0., 0., 1., 0.])
     """
     return (quaternion_rate_matrix(quat, frame) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
@@ -466,47 +296,27 @@ def angular_velocity_from_quaternion_rates(
 
     The function ignores the component of the rates along the quaternion, because this component changes only
     the quaternion's length.
-
-    Args:
-        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
-        rates: (..., 4) rates of `quat`, 1/s, scalar last.
-        frame: Frame of the result: "fixed" means frame 0, "body" means the body's own frame.
-
-    Returns:
-        (..., 3) angular velocity of the body, rad/s.
-
-    Raises:
-        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
     """
     E = quaternion_rate_matrix(quat, frame)
-    w: FloatArray = 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
-    return w
+    return 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
 
 
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Integrate 7.57 with an angular velocity w(t), by the fourth-order Runge-Kutta method.
+    """Return the quaternions (n, ..., 4) at n `times`, by the fourth-order Runge-Kutta method for 7.57.
 
-    The results are orientations as quaternions.
-
-    The exact quaternion has constant length. Rounding and truncation errors change the length, so the
-    quaternion is normalised after each step. If the step is halved, the truncation error is divided by about
-    16.
+    The method makes one step from each time to the next. The times must increase. The exact quaternion has
+    constant length. Rounding and truncation errors change the length, so the quaternion is normalised after
+    each step. If the step is halved, the truncation error is divided by about 16.
 
     Args:
-        w: Function of the time in s that returns the angular velocity, (..., 3) rad/s. This function must be
-            smooth within a step, so add a time to `times` at each jump. For the start and the end of a time
-            step, w(t) is evaluated slightly inside the step.
-        quat: (..., 4) orientation at `times[0]`, unit quaternion, scalar last.
-        times: (n,) increasing times in s; the method makes one step from each time to the next.
-        frame: Frame of w: "fixed" means frame 0, "body" means the body's own frame.
-
-    Returns:
-        (n, ..., 4) unit quaternions, scalar last.
-
-    Raises:
-        InputError: a wrong shape, or times that do not increase.
+        w: Returns the angular velocity (..., 3), rad/s, at a time. This function must be smooth within a
+            step, so add a time to `times` at each jump. For the start and the end of a time step, w(t) is
+            evaluated slightly inside the step.
+        quat: (..., 4) orientation at the first time.
+        times: (n,) seconds.
+        frame: Frame of the angular velocity.
     """
     times = scalars(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -522,7 +332,6 @@ def integrate_orientation(
 def _step(
     w: Callable[[float], ArrayLike], quat: FloatArray, start: float, end: float, frame: ExpressedIn
 ) -> FloatArray:
-    """Return the normalised quaternion after one Runge-Kutta step."""
     step = end - start
     first, middle, last = (
         vectors(w(t), "w") for t in (np.nextafter(start, end), (start + end) / 2.0, np.nextafter(end, start))
@@ -537,10 +346,7 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Return the rates of a quaternion of any length.
-
-    Equation 7.57 is linear in the quaternion, so it needs no unit quaternion.
-    """
+    """Return the rates of a quaternion of any length: 7.57 is linear in the quaternion."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
@@ -549,21 +355,10 @@ def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28).
 
-    Args:
-        axis: (..., 3) unit axis k.
-        angle: (...) angle phi in radians.
-
-    Returns:
-        (..., 3, 3) rotation.
-
-    Raises:
-        InputError: a wrong shape, a value that is not finite, or an axis that is not a unit vector.
-
-    Example:
-        >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
-        array([[ 0., -1.,  0.],
-               [ 1.,  0.,  0.],
-               [ 0.,  0.,  1.]])
+    >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
     """
     axis = unit_vectors(axis, "axis")
     angle = scalars(angle, "angle")[..., np.newaxis, np.newaxis]
@@ -574,85 +369,29 @@ def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
 
 
 def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms).
-
-    Args:
-        axis: (..., 3) unit axis k.
-        angle: (...) angle phi in radians.
-
-    Returns:
-        (..., 3, 3), 1/rad.
-
-    Raises:
-        InputError: as for `rotation_about`.
-    """
+    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms)."""
     return skew(axis) @ rotation_about(axis, angle)
 
 
 def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
-    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34).
-
-    Args:
-        axis: (..., 3) unit axis k.
-        rate: (...) phi-dot in rad/s.
-
-    Returns:
-        (..., 3) rad/s, in the frame of `axis`.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
-    """
-    w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
-    return w
+    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34)."""
+    return scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
-    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about k (7.21).
-
-    Args:
-        axis: (..., 3) unit axis k.
-        rate: (...) phi-dot in rad/s.
-        p: (..., 3) vector from a point on the axis, in metres.
-
-    Returns:
-        (..., 3) velocity in m/s, in the frame of the arguments.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
-    """
+    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about k (7.21)."""
     return np.cross(angular_velocity_about(axis, rate), vectors(p, "p"))
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Split a vector p = k (k . p) + r into the part along the axis k and the radial part r (7.18).
-
-    Args:
-        axis: (..., 3) unit axis k.
-        p: (..., 3).
-
-    Returns:
-        Two arrays (..., 3): the component of p along the axis, and the component r perpendicular to the axis.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
-    """
+    """Split a vector p = k (k . p) + r into the part along the axis k and the radial part r (7.18)."""
     axis, p = unit_vectors(axis, "axis"), vectors(p, "p")
     along = axis * (axis * p).sum(axis=-1, keepdims=True)
     return along, p - along
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi.
-
-    Args:
-        rotation_vector: (..., 3), radians.
-
-    Returns:
-        (..., 3, 3) rotation.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi."""
     vector = vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
@@ -665,41 +404,21 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 def log_rotation(R: ArrayLike) -> FloatArray:
     """Return the rotation vector phi k of a rotation, with phi in [0, pi].
 
-    The result is accurate for every angle, also near 0 and near pi.
-
-    At phi = pi, k and -k are both correct, and the function returns either of them.
-
-    Args:
-        R: (..., 3, 3) rotation.
-
-    Returns:
-        (..., 3), radians.
-
-    Raises:
-        InputError: a wrong shape, or `R` is not a rotation.
+    The result is accurate for every angle, also near 0 and near pi. At phi = pi, k and -k are both correct,
+    and the function returns either of them.
     """
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    small = sine < 1e-150  # for a small angle, phi is twice this sine; the quotient would lose digits
-    log: FloatArray = np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
-    return log
+    small = sine < 1e-150  # Here phi is twice this sine; the quotient would lose digits.
+    return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
 
 def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return the unit axis k and the angle phi in [0, pi] of a rotation, the inverse of `rotation_about`.
 
     The identity has no unique axis; the z axis is returned for it.
-
-    Args:
-        R: (..., 3, 3) rotation.
-
-    Returns:
-        Axis (..., 3) and angle (...) in radians.
-
-    Raises:
-        InputError: a wrong shape, or `R` is not a rotation.
     """
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3]
@@ -710,19 +429,18 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 _AXES = "xyz"
-#: All triples of axes in which neighbouring axes differ.
+#: Neighbouring axes differ in these triples.
 _TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
-#: Names of all sequences: twelve with axes that turn with the body, and twelve with fixed axes.
+#: Twelve sequences have axes that turn with the body, and twelve have fixed axes.
 SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """The axes of an Euler sequence.
+    """The axes of an Euler sequence; the index 0 is x, 1 is y, 2 is z.
 
     Attributes:
-        name: SciPy's name.
-        first: Index of the first body-fixed axis: 0 is x, 1 is y, 2 is z.
+        first: Index of the first body-fixed axis.
         second: Index of the second body-fixed axis.
         third: Index of the third body-fixed axis; in a proper Euler sequence it is equal to `first`.
         other: The index that is neither the first nor the second.
@@ -745,22 +463,11 @@ class Sequence:
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Return the angles, or their rates, in the order of the rotations about body-fixed axes.
-
-        A second call with the result returns the original order.
-        """
+        """Return angles or rates in the order of the body-fixed axes; a second call restores their order."""
         return values[..., ::-1] if self.fixed else values
 
 
 def sequence(name: str) -> Sequence:
-    """Return the Euler sequence with a given name.
-
-    Args:
-        name: Three letters as in SciPy: "ZYZ" for axes that turn with the body, "xyz" for fixed axes.
-
-    Raises:
-        UnknownNameError: the name is not one of the 24.
-    """
     if as_str(name, "an Euler sequence") not in SEQUENCES:
         raise UnknownNameError("Euler sequence", name, SEQUENCES)
     return _sequence(name)
@@ -777,10 +484,7 @@ def _sequence(name: str) -> Sequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return the rotation Rx, Ry or Rz (axis 0, 1 or 2) by `angle` (...), rad.
-
-    The entries that do not depend on the angle are exactly 0 and 1.
-    """
+    """Return the rotation Rx, Ry or Rz (axis 0, 1 or 2); entries without the angle are exactly 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -792,19 +496,7 @@ def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
 
 
 def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the rotation of three angles, for example R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ".
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-
-    Returns:
-        (..., 3, 3) rotation.
-
-    Raises:
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return the rotation of three angles, for example R = Rz(phi) Ry(theta) Rz(psi) for "ZYZ"."""
     axes = sequence(name)
     turns = axes.turning(vectors(angles, "angles"))
     product: FloatArray = (
@@ -822,20 +514,9 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     representational singularity, only the sum or the difference of the first and the third angle is
     determined. The third angle is then computed from the first angle, so that the product of the three
     rotations is correct at the singularity too.
-
-    Args:
-        name: SciPy's name of the sequence.
-        R: (..., 3, 3) rotation.
-
-    Returns:
-        (..., 3) radians, in the order of the name.
-
-    Raises:
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
     """
     axes = sequence(name)
-    R = rotations(R, "R") + 0.0  # adding 0 turns -0 into 0, because arctan2(0, -0) would be pi
+    R = rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0, because arctan2(0, -0) would be pi.
     i, j, m, sign = axes.first, axes.second, axes.other, axes.sign
     if axes.proper:
         first = np.arctan2(R[..., j, i], -sign * R[..., m, i] + 0.0)
@@ -843,8 +524,8 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # The matrix R_first^T R is R_second R_third. Its row `j` (the second axis) depends only on the third
-    # angle.
+    # The matrix R_first^T R is R_second R_third.
+    # Its row `j` (the second axis) depends only on the third angle.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
     # This row has only two entries that are not 0: those of the second axis and of the axis `rest`.
@@ -854,61 +535,31 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> FloatArray:
-    """Return R = Rz(yaw) Ry(pitch) Rx(roll), the rotation of the URDF's `rpy`.
-
-    Args:
-        rpy: (..., 3) roll, pitch, yaw in radians.
-
-    Returns:
-        (..., 3, 3) rotation; exactly the identity for zero angles.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll), the URDF's `rpy`; it is exactly the identity for zero angles."""
     return rotation_from_euler("xyz", rpy)
 
 
 def rpy_of(R: ArrayLike) -> FloatArray:
-    """Return roll, pitch and yaw of a rotation; they are accurate at a pitch of +-pi/2 too (see `euler_of`).
+    """Return roll, pitch and yaw of a rotation; the yaw is 0 if R[0, 0] = R[1, 0] = 0 exactly.
 
-    Args:
-        R: (..., 3, 3) rotation.
-
-    Returns:
-        (..., 3) radians; the yaw is 0 if R[0, 0] = R[1, 0] = 0 exactly.
-
-    Raises:
-        InputError: a wrong shape, or `R` is not a rotation.
+    The angles are accurate at a pitch of +-pi/2 too (see `euler_of`).
     """
     return euler_of("xyz", R)
 
 
-#: Least allowed distance from the singularity, radians. At a smaller distance, computed rates of the angles
-#: lose too many digits.
+#: Nearer than this distance (rad) to the singularity, computed rates lose too many digits.
 NEAREST = 1e-9
 
 
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
     """Return the matrix Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
 
-    The columns of the matrix are the axes of the three rotations.
+    The columns of the matrix are the axes of the three rotations, expressed in frame 0.
 
-    Args:
-        name: SciPy's name of the sequence; the textbook's is "ZYZ".
-        angles: (..., 3) radians, in the order of the name.
-
-    Returns:
-        (..., 3, 3), dimensionless, expressed in frame 0.
-
-    Raises:
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
-
-    Example:
-        >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
-        array([[0., 0., 1.],
-               [0., 1., 0.],
-               [1., 0., 0.]])
+    >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
+    array([[0., 0., 1.],
+           [0., 1., 0.],
+           [1., 0., 0.]])
     """
     axes = sequence(name)
     turns = axes.turning(vectors(angles, "angles"))
@@ -920,42 +571,16 @@ def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54).
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-        rates: (..., 3) rates of the angles, rad/s.
-
-    Returns:
-        (..., 3) angular velocity, rad/s, expressed in frame 0.
-
-    Raises:
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54)."""
     product = euler_rate_matrix(name, angles) @ vectors(rates, "rates")[..., np.newaxis]
     return product[..., 0]
 
 
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56).
+    """Return the rates Omega^-1 w of Euler angles from the angular velocity w, in closed form (7.56).
 
-    They are computed in closed form.
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-        w: (..., 3) angular velocity, rad/s, expressed in frame 0.
-        nearest: Least allowed distance from the singularity, radians.
-
-    Returns:
-        (..., 3) rates, rad/s, in the order of the name.
-
-    Raises:
-        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
+    If the distance from the singularity is `nearest` radians or less, it raises
+    RepresentationSingularityError.
     """
     return (euler_rate_inverse(name, angles, nearest) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
@@ -963,30 +588,17 @@ def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEA
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return the matrix Omega^-1, computed from the geometry of the axes and not by elimination (7.56).
 
-    In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
-    axis has no component along the second axis. One component of w then gives the third rate, and the other
-    two components give the first and the second rate.
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-        nearest: Least allowed distance from the singularity, radians.
-
-    Returns:
-        (..., 3, 3).
-
-    Raises:
-        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
+    In the frame after the first rotation, the first and the second axis are coordinate axes. The third axis
+    has no component along the second axis. One component of w then gives the third rate, and the other two
+    components give the first and the second rate. The errors are those of `euler_rates`.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
     axes = sequence(name)
     turns = axes.turning(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # The third axis has two components in the frame after the first rotation: `along` the first axis, and
-    # `across`, which is along the axis `other`.
+    # The frame after the first rotation has the axes `first`, `second` and `other`.
+    # The third axis has the component `along` the axis `first` and the component `across` along `other`.
     if axes.proper:
         along, across = cosine, -axes.sign * sine
     else:
@@ -1001,54 +613,28 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
 
 
 def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the distance of the middle angle from the representational singularity (gimbal lock).
+    """Return the distance (radians in [0, pi/2]) of the middle angle from the singularity (gimbal lock).
 
     A proper Euler sequence such as ZYZ is singular if the middle angle is a multiple of pi (the textbook
     names only 0). The other sequences are singular if the middle angle is an odd multiple of pi/2.
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-
-    Returns:
-        (...) radians in [0, pi/2].
-
-    Raises:
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
     """
     middle = vectors(angles, "angles")[..., 1]
     sine, cosine = np.abs(np.sin(middle)), np.abs(np.cos(middle))
-    distance: FloatArray = np.arctan2(sine, cosine) if sequence(name).proper else np.arctan2(cosine, sine)
-    return distance
+    return np.arctan2(sine, cosine) if sequence(name).proper else np.arctan2(cosine, sine)
 
 
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the condition number of Omega.
+    """Return the condition number of Omega; it is 1 if the three axes are perpendicular to each other.
 
     The condition number is the largest factor by which the relative error of the rates exceeds the relative
-    error of the angular velocity w.
-
-    The middle axis is perpendicular to the first and to the third axis. Let d be the angle between the first
-    and the third axis. The singular values of Omega are then 1 and sqrt(1 +- cos d), and its condition number
-    is cot(d / 2).
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-
-    Returns:
-        (...) condition number; it is 1 if the three axes are perpendicular to each other.
-
-    Raises:
-        RepresentationSingularityError: a sample is at the singularity, where no condition number exists.
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
+    error of the angular velocity w. The middle axis is perpendicular to the first and to the third axis. Let
+    d be the angle between the first and the third axis. The singular values of Omega are then 1 and
+    sqrt(1 +- cos d), and its condition number is cot(d / 2). At the singularity, no condition number exists,
+    and the function raises RepresentationSingularityError.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)
-    condition: FloatArray = 1.0 / np.tan(singularity_distance(name, angles) / 2.0)
-    return condition
+    return 1.0 / np.tan(singularity_distance(name, angles) / 2.0)
 
 
 def _refuse_singular(name: str, angles: FloatArray, nearest: float) -> None:

@@ -179,7 +179,7 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 EPS = sys.float_info.epsilon
-#: Relative error of a number that was rounded to single precision.
+#: Rounding a number to single precision has this relative error.
 SINGLE = 2.0**-24
 #: The smallest normal number.
 SMALLEST = sys.float_info.min
@@ -188,24 +188,22 @@ LEAST_UNIT = EPS * SMALLEST
 #: Least divisor: `max(x, NOT_ZERO)` avoids a division by 0. Every measured number is larger.
 NOT_ZERO = 1e-300
 
-#: Allowed difference (in eps) between urdfkin and Pinocchio, for each joint and each factor of a term such as
-#: w x (w x d). The module docstring derives it.
+#: This is the allowed difference (in eps) from Pinocchio; the module docstring derives it.
+#: It applies to each joint and to each factor of a term such as w x (w x d).
 ROUNDINGS = 24.0
-#: Allowed difference (in eps) between urdfkin and MuJoCo, for each joint and each factor of a term such as w
-#: x (w x d). The module docstring derives it.
+#: This is the allowed difference (in eps) from MuJoCo; otherwise it is like `ROUNDINGS`.
 MUJOCO = 30.0
-#: Allowed error (in eps) of a mimic rule of an MJCF file, between urdfkin's tree and MuJoCo (derivation
-#: above).
+#: A mimic rule of an MJCF file may have this error (in eps) between urdfkin's tree and MuJoCo.
 MJCF_RULE = 8.0
-#: Allowed error (in eps) for each row of a Denavit-Hartenberg table (derivation above).
+#: Each row of a Denavit-Hartenberg table may have this error (in eps).
 ROW = 8.0
 
-# Constants for an export in single precision (`urdfkin.export.single`); derivation above.
+# Exports in single precision use these constants (`urdfkin.export.single`); they are derived above.
 
 SINGLE_EPS = 2.0**-23
 #: The smallest normal number, and the largest number.
 SINGLE_SMALLEST, SINGLE_LARGEST = 2.0**-126, (2.0 - SINGLE_EPS) * 2.0**127
-#: Relative error of the result of each operation, in eps.
+#: The result of each operation has this relative error, in eps.
 SINGLE_OPERATION = {
     "+": 0.5,
     "-": 0.5,
@@ -216,60 +214,60 @@ SINGLE_OPERATION = {
     "sin": 3.5,
     "cos": 3.5,
 }
-#: Absolute error (in eps) of a sine or cosine that is computed by a polynomial.
+#: A sine or cosine by a polynomial has this absolute error (in eps).
 SINGLE_POLYNOMIAL = 1.0
 
-# Rounding errors of the pose of one joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
+# These are rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Allowed difference (in eps) between the constant poses that two programs read from the same file, for each
-#: URDF joint. If all roundings add up, the difference is 18.9. This is the sum of the first table in the
-#: module docstring, without the rotation about the axis. The standard deviation of the difference is 2.4, so
-#: 13.7 is nearly six standard deviations.
+#: Constant poses that two programs read from one file may differ by this number (in eps) for each joint.
+#: If all roundings add up, the difference is 18.9.
+#: This is the sum of the first table in the module docstring, without the rotation about the axis.
+#: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
-#: Error (in eps) of the directions of two joint axes. Dividing an axis by its length has an error of 0.5.
-#: Rotating it by Rodrigues' formula has an error of 2.0.
+#: The directions of two joint axes have this error (in eps).
+#: Dividing an axis by its length has an error of 0.5; rotating it by Rodrigues' formula has one of 2.0.
 AXES = 5.0
-#: Error (in eps) for each joint, caused by the program that wrote the file. A double that is written with
-#: fifteen digits (DBL_DIG) has an error of half a unit in the last digit. This is 5e-15 rad, or 22.5 eps, for
-#: an angle up to pi. The number counts this error twice, for roll and for pitch, because both tilt an axis.
+#: The program that wrote the file causes this error (in eps) for each joint.
+#: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
+#: This is 5e-15 rad, or 22.5 eps, for an angle up to pi.
+#: The number counts this error twice, for roll and for pitch, because both tilt an axis.
 #: Yaw does not tilt it.
 WRITTEN = 45.0
-#: Error of a length along an axis, in units of eps times the length of the path. The dot product has an error
-#: of 2.4, and each sum has an error of 0.5 of its own value. Only a few of these sums are nearly as large as
-#: the path's length.
+#: A length along an axis has this error, in units of eps times the length of the path.
+#: The dot product has an error of 2.4, and each sum has an error of 0.5 of its own value.
+#: Only a few of these sums are nearly as large as the path's length.
 SUMMED = 4.0
 
 # Tolerances: a number that differs less than this from a round number is replaced by the round number.
 
-#: Error (in eps) of an angle up to pi. It is the sum of three errors, rounded up: 1.2 for a computed multiple
-#: of pi/12, 1.0 for a number in a file (half a unit in the last place), and 1.1 for arctan2.
+#: The error (in eps) of an angle up to pi is the sum of three errors, rounded up.
+#: They are 1.2 for a computed multiple of pi/12, and 1.1 for arctan2.
+#: The third is 1.0 for a number in a file (half a unit in the last place).
 ANGLE = 4.0
-#: Error (in eps) of an entry of a rotation matrix. The entry is a difference of two products, which has an
-#: error of 0.75. One factor of these products is also a difference of two products, with another error of
-#: 0.75.
+#: An entry of a rotation matrix has this error (in eps).
+#: The entry is a difference of two products, which has an error of 0.75.
+#: A factor of these products is also a difference of two products, with another error of 0.75.
 ENTRY = 2.0
-#: Error of a length that is rounded to twelve digits. Its unit is that of `SUMMED`: eps times the length of
-#: the path.
+#: A length that is rounded to twelve digits has this error, in the unit of `SUMMED`.
 DIGITS = SUMMED / 2.0
-#: Error (in eps) of the angle between two rotations. One rotation is computed from roll, pitch and yaw, with
-#: an error of 3.1. The other is a product of three rotations. Its errors are 0.5 for the sines, 0.5 for the
-#: cosines, and 1.4 and 1.8 for the two products.
+#: The angle between two rotations has this error (in eps).
+#: One rotation is computed from roll, pitch and yaw, with an error of 3.1.
+#: The other is a product of three rotations.
+#: Its errors are 0.5 for the sines, 0.5 for the cosines, and 1.4 and 1.8 for the two products.
 TURN = 8.0
 
-#: Error (in eps) of a limit of a mimic joint after its conversion to a limit of the mimicked joint. The
-#: conversion consists of a subtraction and a division, and the mimic rule consists of a multiplication and an
-#: addition. Each of these four operations has an error of 0.5. The sum 2.0 is doubled, so that a value at the
-#: limits is accepted.
+#: A mimic joint's limit, converted to a limit of the mimicked joint, has this error (in eps).
+#: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
+#: Each of these four operations has an error of 0.5.
+#: The sum 2.0 is doubled, so that a value at the limits is accepted.
 FOLLOWER = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
     """Return the allowed difference (in eps) of two programs with the same URDF, for each factor of a term.
 
-    Args:
-        joints: (...,) number of joints on the path.
-        tilt: (...,) radians, the sum over the path's joints of the angle between Pinocchio's axis and the
-            file's axis.
+    `joints` is the number of joints on the path. `tilt` is the sum over these joints of the angle (radians)
+    between Pinocchio's axis and the file's axis.
 
     >>> of_joints([7, 8]).tolist()
     [168.0, 192.0]
@@ -288,8 +286,8 @@ def of_rows(rows: int) -> float:
 def of_rows_read_back(rows: int) -> float:
     """Return the number of roundings in a comparison of a table with the URDF that was written from it.
 
-    The number is `4 * of_rows(rows)`: `of_rows(rows)` for the pose from the table, the same for Pinocchio's
-    pose from the URDF, and twice as much for the conversion to roll, pitch and yaw.
+    The pose from the table has `of_rows(rows)`, and so has Pinocchio's pose from the URDF. The conversion to
+    roll, pitch and yaw has twice as many.
     """
     return 4.0 * of_rows(rows)
 

@@ -105,8 +105,7 @@ STILL_STATE = frozen(STILL.state(()))
 def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
     """Subtract gravity (3,), m/s^2, from the linear acceleration of base states (1 or n, 24).
 
-    An accelerometer on a fixed base under gravity has the same readings as an accelerometer on this
-    accelerated base without gravity.
+    An accelerometer has the same readings on a fixed base under gravity and on the resulting base without it.
     """
     lifted = state.copy()
     lifted[:, -3:] -= gravity

@@ -9,7 +9,6 @@ sign of the URDF, because the inverse of a rotation by q about z is a rotation b
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,8 +33,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Smallest size (m) of a robot in a comparison. Without it, a robot whose frames all coincide would cause a
-#: division by 0.
+#: A robot has at least this size (m) in a comparison, also if all its frames coincide.
 LEAST_SIZE = 1e-9
 
 
@@ -50,8 +48,8 @@ class ChainJoint:
         T_previous_joint: (4, 4) pose of the joint's frame before the joint's own motion. The z axis of this
             frame is the joint's axis, reversed if `backwards`. The pose is relative to the previous joint's
             frame after that joint's motion; for the first joint, relative to the base.
-        limit: Limits of the joint; None if the joint has no limits.
-        mimic: Mimic rule of the joint; None if the joint has its own coordinate.
+        limit: None if the joint has no limits.
+        mimic: None if the joint has its own coordinate.
     """
 
     name: str
@@ -108,8 +106,10 @@ class FrameChain(Displayable):
         rows = [
             (
                 joint.name,
-                " ".join([joint.kind.value, *["backwards"] * joint.backwards, *_rule_text(joint)]),
-                *("" if joint.limit is None else f"{x:.6g}" for x in _bounds(joint.limit)),
+                joint.kind.value
+                + " backwards" * joint.backwards
+                + (f" = {joint.mimic}" if joint.mimic else ""),
+                *(("", "") if (x := joint.limit) is None else (f"{x.lower:.6g}", f"{x.upper:.6g}")),
                 *origin,
                 *axis,
             )
@@ -240,26 +240,10 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
 
 
-def _rule_text(joint: ChainJoint) -> list[str]:
-    """Return a list with the text of a joint's mimic rule, or an empty list without a rule."""
-    return [f"= {joint.mimic}"] if joint.mimic else []
-
-
-def _bounds(limit: Limit | None) -> tuple[float, float]:
-    return (-math.inf, math.inf) if limit is None else (limit.lower, limit.upper)
-
-
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
-    """Return the path from `base` to `tip`. If `base` is None, the path starts at the root.
+    """Return the path from the link or joint frame `base` (by default the root) to the frame `tip`.
 
-    Args:
-        tree: The robot.
-        tip: Name of a link or joint frame.
-        base: Name of a link or joint frame.
-
-    Raises:
-        UnknownNameError: no frame has that name; the message lists the nearest names.
-        InputError: a planar or floating joint lies on the path.
+    A planar or floating joint on the path raises InputError; an unknown name UnknownNameError.
     """
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
@@ -274,8 +258,8 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
             lengths.append(length)
             folded.append(count)
-            # A joint's constant pose comes before its motion. If the path leads from the joint's child to its
-            # parent, the constant pose comes after the motion.
+            # A joint's constant pose comes before its motion.
+            # If the path leads from the joint's child to its parent, the constant pose comes after it.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0
@@ -284,11 +268,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
 
 
 def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
-    """Return all joints from `base` to `tip`; True marks a joint that the path passes from child to parent.
-
-    Raises:
-        UnknownNameError: no frame has that name.
-    """
+    """Return all joints from `base` to `tip`; True marks a joint that is passed from child to parent."""
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0
     while common < min(len(up), len(down)) and up[common] == down[common]:

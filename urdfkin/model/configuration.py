@@ -40,7 +40,7 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest bound of a range (rad or m). The same number replaces a missing limit.
+#: This number (rad or m) bounds a range and replaces a missing limit.
 WIDEST = 10.0
 
 
@@ -51,10 +51,9 @@ class NarrowedRange:
     Attributes:
         joint: Name of the mimicked joint.
         own: The range from the limits of the mimicked joint.
-        kept: The part of the range `own` in which all mimic joints are within their limits; None if there is
-            no such part.
+        kept: The part of `own` in which all mimic joints are within their limits; None if there is none.
         by: Names of the mimic joints whose limits make the range smaller.
-        unit: Unit of the ranges, "rad" or "m".
+        unit: "rad" or "m".
     """
 
     joint: str
@@ -81,11 +80,7 @@ def range_words(ends: tuple[float, float]) -> str:
 
 
 def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
-    """Return the lower and upper end of a joint's range, rad or m.
-
-    Without limits, the range of a revolute joint is -pi to pi (rad), and that of a prismatic joint is
-    -`slide` to `slide` (m).
-    """
+    """Return the ends of a joint's range, rad or m; without limits, -pi to pi or -`slide` to `slide`."""
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
     return (-math.pi, math.pi) if kind.turns else (-slide, slide)
@@ -98,10 +93,7 @@ def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int =
 
 
 def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint that has exactly one coordinate.
-
-    The ranges do not consider the limits of joints that mimic a joint.
-    """
+    """Return the range of each joint with exactly one coordinate, without the limits of its mimic joints."""
     return {joint.name: _own_range(joint) for joint in tree.joints if joint.nq == 1}
 
 
@@ -147,8 +139,7 @@ def _narrowed(leader: Joint, own: tuple[float, float], joints: list[Joint]) -> N
 def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
     """Return the part of a mimicked joint's range in which a mimic joint is within its limits.
 
-    If the mimic joint is outside its limits in the whole range, the returned lower end is above the upper
-    end.
+    If the mimic joint is outside its limits in the whole range, the lower end is above the upper end.
     """
 
     def keeps(leader: float) -> bool:
@@ -156,7 +147,7 @@ def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[f
         own = rule.multiplier * leader + rule.offset
         return bool(np.nextafter(limit.lower, -np.inf) <= own <= np.nextafter(limit.upper, np.inf))
 
-    if keeps(lower) and keeps(upper):  # if the ends are within the limits, so is every value between the ends
+    if keeps(lower) and keeps(upper):  # Then every value between the ends is within the limits too.
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
@@ -165,7 +156,7 @@ def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[f
     room = (
         FOLLOWER * EPS * (max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)) / abs(rule.multiplier)
     )
-    if not math.isfinite(room):  # a mimic joint with one limit only
+    if not math.isfinite(room):  # The mimic joint has one limit only.
         room = FOLLOWER * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
     return (
         lower if keeps(lower) else max(lower, ends[0] + room),
@@ -182,11 +173,11 @@ def _own_range(joint: Joint) -> tuple[float, float]:
     return (lower, upper) if lower <= upper else (upper, lower)
 
 
-#: Largest difference (rad or m) between a mimic joint's coordinate and its mimic rule in `from_pinocchio`.
+#: In `from_pinocchio`, a mimic joint may deviate from its rule by this number (rad or m).
 _MIMIC_TOLERANCE = 1e-9
 
 
-#: Suffix and unit of each number of a joint that has several numbers in q or v.
+#: Each number of a joint with several numbers in q or v has a suffix and a unit.
 _OF_Q = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
@@ -198,7 +189,7 @@ _OF_RATES = {
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return a name for each number of `q`: the joint's name, with a suffix if the joint has several numbers.
+    """Return a name for each number of `q`: the joint's name, with a suffix for one of several numbers.
 
     Example: `base.x`, `base.y`, ...; if another joint has such a name, `base:x`, `base:y`, ...
     """
@@ -213,7 +204,7 @@ def rate_names(tree: KinematicTree) -> tuple[str, ...]:
 def _names_and_units(
     tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield a unique name and the unit of each number of q or v. Joint names have no suffix."""
+    """Yield a unique name and the unit of each number of q or v."""
     taken = set[str]()
     for joint in tree.joints:
         if not joint.nv:
@@ -230,7 +221,7 @@ def _names_and_units(
 
 
 def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
-    """Return the unit of each number of q, v or a: "rad", "m" or "" (no unit). The time unit is omitted."""
+    """Return the unit of each number of q, v or a: "rad", "m" or "" (none); the time unit is omitted."""
     return tuple(unit for _, unit in _names_and_units(tree, _OF_Q if what == "q" else _OF_RATES))
 
 
@@ -381,7 +372,7 @@ def _demand_within_limits(tree: KinematicTree, held: Mapping[str, float]) -> Non
 
     Joints that mimic a locked joint are checked too, unless they violate their limits at every value.
     """
-    q = np.full(tree.nq, np.nan)  # NaN is never outside a limit
+    q = np.full(tree.nq, np.nan)  # NaN is never outside a limit.
     for name, value in held.items():
         q[tree.q_index[tree.joint_index(name)]] = value
     impossible = {name for one in narrowed_ranges(tree) if one.kept is None for name in one.by}
@@ -417,8 +408,7 @@ def velocity_limits(tree: KinematicTree) -> FloatArray:
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
     """Return `q` with the quaternions of floating joints normalised (a copy if there are any).
 
-    Raises:
-        InputError: the norm of a quaternion differs from 1 by more than 1e-6.
+    A quaternion whose norm differs from 1 by more than 1e-6 raises InputError.
     """
     if not tree.floating_joints:
         return q
@@ -460,7 +450,7 @@ def shaped(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -
 
 
 def checked(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
-    """Return the result of `shaped`. Raise NotFiniteError if a number is not finite."""
+    """Return the result of `shaped`; raise NotFiniteError if a number is not finite."""
     array = shaped(tree, value, what, look=look)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]
@@ -475,10 +465,7 @@ def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return a message for each joint that is outside its limits in a configuration of `q` (..., nq).
-
-    Mimic joints are checked too.
-    """
+    """Return a message for each joint, mimic joints too, outside its limits in a configuration of `q`."""
     return [words for _, words in _violations(tree, q)]
 
 
@@ -499,8 +486,8 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 def _degrees(joint: Joint, value: float) -> str:
     """Return a hint to write the unit `deg` if the value looks like degrees, else an empty text.
 
-    A value of a revolute joint looks like degrees if it is beyond `LARGEST_ANGLE` and far outside the limits,
-    but would be within the limits if it were converted from degrees to radians.
+    Only a value of a revolute joint beyond `LARGEST_ANGLE` and far outside the limits looks like degrees.
+    After a conversion to radians, it must be within the limits.
     """
     if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
         return ""
@@ -510,17 +497,15 @@ def _degrees(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: Number of configurations of a batch in which `warn_of_degrees` looks for degrees. A few are enough, because
-#: a whole batch has the same unit.
+#: `warn_of_degrees` looks for degrees in this number of configurations of a batch.
+#: A few are enough, because a whole batch has the same unit.
 _LOOKED_AT = 16
 
 
 def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return the lines of `limit_violations` for values that look like degrees, in at most 16 configurations.
+    """Return the lines of `limit_violations` for values that look like degrees.
 
-    Args:
-        tree: The robot.
-        q: (..., nq) rad, m.
+    At most 16 configurations of `q` (..., nq) are checked.
     """
     if tree.least_implausible == math.inf or not q.size:
         return []
@@ -529,7 +514,7 @@ def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
     elif q.ndim > 2:
         most = max(1, int(_LOOKED_AT ** (1.0 / (q.ndim - 1))))
         q = q[tuple(slice(None, None, -(-size // most)) for size in q.shape[:-1])]
-    flat = q.ravel()  # argmax is several times faster than max for a short array
+    flat = q.ravel()  # For a short array, argmax is several times faster than max.
     if not max(flat.item(flat.argmax()), -flat.item(flat.argmin())) > tree.least_implausible:
         return []
     return [words for joint, words in _violations(tree, q) if not joint.mimic and "; degrees? " in words]
@@ -557,56 +542,35 @@ def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | Non
 # -- Pinocchio's layout ------------------------------------------------------------------------------
 
 
-def pinocchio_coordinates(joint: Joint, own: FloatArray) -> FloatArray:
-    """Convert one joint's coordinates (..., joint.kind.nq) to Pinocchio's coordinates (..., k)."""
-    if joint.kind.nq_pinocchio == joint.kind.nq:
-        return own
-    return np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
-
-
-def pinocchio_blocks(tree: KinematicTree, q: FloatArray, *, mimic: bool) -> Iterator[tuple[int, FloatArray]]:
-    """Yield each joint that has coordinates in Pinocchio's model: its index, and these coordinates.
-
-    Args:
-        tree: The robot.
-        q: (..., nq).
-        mimic: False for Pinocchio's default model, in which mimic joints have coordinates too; True for a
-            model built with `mimic=True`.
-    """
-    for i, (joint, at) in enumerate(zip(tree.joints, tree.q_index, strict=True)):
-        if not _in_pinocchio(joint, mimic=mimic):
-            continue
-        own = q[..., at : at + joint.kind.nq]
-        if joint.mimic:
-            own = joint.mimic.multiplier * own + joint.mimic.offset
-        yield i, pinocchio_coordinates(joint, own)
-
-
 def _in_pinocchio(joint: Joint, *, mimic: bool) -> bool:
-    """Return whether a joint has coordinates in Pinocchio's model (`mimic` as in `pinocchio_blocks`)."""
     return joint.kind.nq > 0 and not (mimic and joint.mimic)
 
 
 def _pinocchio_length(tree: KinematicTree, *, mimic: bool) -> int:
-    """Return the number of coordinates of Pinocchio's model."""
     present = (joint.kind for joint in tree.joints if _in_pinocchio(joint, mimic=mimic))
     return sum(kind.nq_pinocchio for kind in present)
 
 
 def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     """Convert `q` (..., nq) to Pinocchio's layout (..., nq_pinocchio)."""
-    blocks = [block for _, block in pinocchio_blocks(tree, q, mimic=mimic)]
-    return np.concatenate(blocks, axis=-1) if blocks else np.zeros((*q.shape[:-1], 0))
+    blocks = [np.zeros((*q.shape[:-1], 0))]
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        if not _in_pinocchio(joint, mimic=mimic):
+            continue
+        own = q[..., at : at + joint.kind.nq]
+        if joint.mimic:
+            own = joint.mimic.multiplier * own + joint.mimic.offset
+        if joint.kind.nq_pinocchio > joint.kind.nq:
+            own = np.concatenate((own[..., :-1], np.cos(own[..., -1:]), np.sin(own[..., -1:])), axis=-1)
+        blocks.append(own)
+    return np.concatenate(blocks, axis=-1)
 
 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     """Convert Pinocchio's configuration (..., nq_pinocchio) to urdfkin's (..., nq).
 
-    Angles of continuous and planar joints are returned in [-pi, pi].
-
-    Raises:
-        InputError: `q` has a wrong length, a (cos, sin) pair does not have norm 1, or a mimic joint does not
-            obey its rule.
+    Angles of continuous and planar joints are returned in [-pi, pi]. A wrong length, a (cos, sin) pair whose
+    norm is not 1, or a mimic joint that does not obey its rule raises InputError.
     """
     length = _pinocchio_length(tree, mimic=mimic)
     if q.shape[-1:] != (length,):
@@ -676,7 +640,7 @@ _RANGE = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """`q` (n, nq), `v` and `a` (n, nv)."""
+    """Random configurations `q` (n, nq), velocities `v` and accelerations `a` (n, nv)."""
 
     q: FloatArray
     v: FloatArray
@@ -702,12 +666,8 @@ def _uniform(
         if joint.nq == 1:
             q[:, at] = rng.uniform(*ranges[joint.name], (n, 1))[:, 0]
         elif joint.nq:
-            q[:, at : at + joint.nq] = _sample_joint(joint, n, rng)
+            q[:, at : at + joint.nq] = _SAMPLED[joint.kind](n, rng)
     return q
-
-
-def _sample_joint(joint: Joint, n: int, rng: np.random.Generator) -> FloatArray:
-    return _SAMPLED[joint.kind](n, rng)
 
 
 def _sample_planar(n: int, rng: np.random.Generator) -> FloatArray:
@@ -720,7 +680,7 @@ def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
 
 
-#: Functions that draw random coordinates of a joint with several coordinates.
+#: These functions draw random coordinates of a joint with several coordinates.
 _SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
 
 

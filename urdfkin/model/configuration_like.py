@@ -51,10 +51,8 @@ class CoordinateLayout:
 
     Attributes:
         what: "q", "v" or "a".
-        names: The name of each number.
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
-        spans: For each joint with several numbers: the index of its first number, and how many numbers it
-            has.
+        spans: For each joint with several numbers: the index of its first number, and their count.
         poses: Returns the named poses. urdfkin calls the functions `poses`, `otherwise` and `lengths` only if
             an input needs them.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
@@ -73,13 +71,8 @@ class CoordinateLayout:
     def read(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
         """Return the numbers (..., n) of q, v or a that a text or a mapping describes.
 
-        Args:
-            value: Text or mapping, as the module's docstring describes.
-            where: Name of the input in messages.
-
-        Raises:
-            InputError: too few or too many numbers, an invalid number, or a wrong unit.
-            UnknownNameError: an unknown coordinate, joint velocity or pose.
+        `where` names the input in messages. Too few or too many numbers, an invalid number or a wrong
+        unit raises InputError; an unknown coordinate, joint velocity or pose raises UnknownNameError.
 
         >>> rest = {"neutral": np.zeros(2)}
         >>> arm = CoordinateLayout("q", ("shoulder", "elbow"), ("rad", "rad"), poses=lambda: rest)
@@ -99,13 +92,9 @@ keeps: 'neutral, elbow=...'
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Read a text or mapping with names.
+        """Return the values of a text or mapping by name, and the pose with which the text begins, or None.
 
-        Return the values by name, and the pose with which the text begins, or None.
-
-        Raises:
-            InputError: the text has numbers without names, or a name twice.
-            UnknownNameError: an unknown pose.
+        Numbers without names, or a repeated name, raise InputError; an unknown pose UnknownNameError.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).named("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)
@@ -140,9 +129,8 @@ keeps: 'neutral, elbow=...'
     def demand_names(self, names: Sequence[str], where: str) -> None:
         """Check that each name belongs to a coordinate or to a joint with several coordinates.
 
-        Raises:
-            UnknownNameError: there is no such coordinate.
-            InputError: a name belongs to a fixed joint or a mimic joint, or a name is not a string.
+        A name that belongs to nothing raises UnknownNameError; a fixed joint, a mimic joint or a name that is
+        not a string raises InputError.
         """
         for name in names:
             if not isinstance(name, str) or (name not in self.names and name not in self.spans):
@@ -189,10 +177,7 @@ keeps: 'neutral, elbow=...'
         return out
 
     def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
-        """Return the numbers of a joint with several coordinates: index in q, v or a, and value.
-
-        Raises an error for another name.
-        """
+        """Return the numbers of a joint with several coordinates, by index; other names raise an error."""
         if not isinstance(name, str) or name not in self.spans:
             raise self._not_a_coordinate(name, where)
         at, size = self.spans[name]
@@ -203,7 +188,6 @@ keeps: 'neutral, elbow=...'
         return {at + k: x[..., k] for k in range(size)}
 
     def _not_a_coordinate(self, name: object, where: str) -> InputError | UnknownNameError:
-        """Return the exception for a name that is not a coordinate of this layout."""
         kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
         if not isinstance(name, str):
             return InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
@@ -221,11 +205,7 @@ keeps: 'neutral, elbow=...'
         )
 
     def _number(self, text: str, where: str, unit: str | None) -> float:
-        """Return one number in SI units.
-
-        Raises:
-            InputError: the text is not a number, or its unit is wrong.
-        """
+        """Return one number in SI units; raise InputError for an invalid number or a wrong unit."""
         found = parse_quantity(text)
         value = parse_float(text) if found is None else found.value
         if value is None:
@@ -248,13 +228,9 @@ keeps: 'neutral, elbow=...'
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return values that have names.
+    """Return a text or a mapping unchanged, and a table with labels as a mapping; else None.
 
-    A text or a mapping is returned unchanged. A table with labels, such as a data frame, is converted
-    to a mapping. For numbers without names, the result is None.
-
-    Raises:
-        InputError: a label occurs twice, or `value` is a list of tables with labels.
+    A label that occurs twice, or a list of tables with labels, raises InputError.
 
     >>> by_name([0.5, 0.1], "q"), by_name("ready", "q"), by_name({"elbow": 0.5}, "q")
     (None, 'ready', {'elbow': 0.5})
@@ -280,10 +256,7 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
 
 
 def _labels(value: object) -> list[Any]:
-    """Return a table's labels: its `keys()`, `columns` or `column_names`.
-
-    The result is empty if the labels are 0, 1, 2, ...
-    """
+    """Return a table's `keys()`, `columns` or `column_names`; nothing if they are 0, 1, 2, ..."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []
@@ -301,7 +274,6 @@ def wrong_count(
     remedy: str | None = None,
     question: Question = Question.JOINT_ORDER,
 ) -> InputError:
-    """Return the error for a wrong count of numbers."""
     without = f", none for {listed(names[count:])}" if count < len(names) else ""
     return InputError(
         f"{len(names)} numbers are expected ({listed(names) or 'none: no joint moves'})",

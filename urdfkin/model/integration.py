@@ -80,19 +80,13 @@ def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
 
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
-    """Return the joints with their own coordinates.
-
-    For each joint, the result also has the index of its first number in q and in v.
-    """
+    """Return the joints with their own coordinates; each has the index of its first number in q and in v."""
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
     return [(joint, at, to) for joint, at, to in rows if joint.nv]
 
 
 def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the position (..., 3) and rotation (..., 3, 3) that a joint's coordinates describe.
-
-    The joint is planar or floating.
-    """
+    """Return the position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
     if joint.kind is JointKind.FLOATING:
         return own[..., :3], rotation_of(own[..., 3:])
     if joint.kind is not JointKind.PLANAR:

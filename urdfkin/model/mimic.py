@@ -23,16 +23,13 @@ from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, froz
 class Coupling:
     """The linear map from a path's coordinates to the values of its joints: values = G q + g.
 
-    Attributes:
-        joints: Names of all moving joints of the path, from the base to the tip.
-        mimics: The mimic rule of each joint; None for a joint with its own coordinate.
-        kinds: The kind of each joint.
+    `joints` are the names of all moving joints of the path, from the base to the tip. The mimic rule of a
+    joint with its own coordinate is None.
 
-    Example:
-        >>> turn = JointKind.REVOLUTE
-        >>> couple = Coupling(("a", "b"), (None, Mimic("a", 2.0, 0.5)), (turn, turn))
-        >>> couple.names, couple.values([1.0]).tolist(), couple.values({"a": "180deg"}).round(2).tolist()
-        (('a',), [1.0, 2.5], [3.14, 6.78])
+    >>> turn = JointKind.REVOLUTE
+    >>> couple = Coupling(("a", "b"), (None, Mimic("a", 2.0, 0.5)), (turn, turn))
+    >>> couple.names, couple.values([1.0]).tolist(), couple.values({"a": "180deg"}).round(2).tolist()
+    (('a',), [1.0, 2.5], [3.14, 6.78])
     """
 
     joints: tuple[str, ...]
@@ -49,11 +46,7 @@ class Coupling:
 
     @cached_property
     def matrix(self) -> FloatArray:
-        """The matrix G (joints, coordinates).
-
-        Column k contains the velocities of the joints if coordinate k has velocity 1 and all others have
-        velocity 0.
-        """
+        """The matrix G (joints, coordinates)."""
         G = np.zeros((len(self.joints), len(self.names)))
         G[np.arange(len(self.joints)), self._leader_index] = self._multiplier
         return frozen(G)
@@ -64,10 +57,7 @@ class Coupling:
         return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def places(self, what: str = "q") -> CoordinateLayout:
-        """Return the names and units of the numbers of the path's q, v or a.
-
-        The names and units are needed to read values that are given by name.
-        """
+        """Return the names and units of the path's q, v or a, which are needed to read values by name."""
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
         # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
@@ -81,15 +71,9 @@ class Coupling:
         return CoordinateLayout(what, self.names, own, poses=lambda: neutral, otherwise=lambda: follow)
 
     def values(self, q: Given) -> FloatArray:
-        """Return the values (..., joints) of all joints, rad or m.
+        """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates).
 
-        Args:
-            q: (..., coordinates) in the order of `names`, or a mapping by name, or text
-                (`urdfkin.model.configuration_like`).
-
-        Raises:
-            InputError: the last axis of `q` has the wrong length, or a name is missing.
-            UnknownNameError: a name is not a coordinate of the path.
+        A wrong length of the last axis or a missing name raises InputError; an unknown name UnknownNameError.
         """
         coordinates = self.checked(q, "q")
         # This is G q + g, because each row of G contains only one number that is not zero.
@@ -98,8 +82,7 @@ class Coupling:
     def checked(self, array: Given, what: str) -> FloatArray:
         """Return `array` as float64; `what` ("q", "v" or "a") is its name in messages.
 
-        Raises:
-            InputError: the last axis has the wrong length.
+        A last axis with the wrong length raises InputError.
         """
         if (named := by_name(array, what)) is not None:
             return self.places(what).read(named)
@@ -123,19 +106,15 @@ class Coupling:
         return frozen([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
 
     def q_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """For each coordinate of the path, return the index in the robot's configuration `q`."""
+        """Return the index in the robot's configuration `q` for each coordinate of the path."""
         return tuple(tree.q_index[tree.joint_index(name)] for name in self.names)
 
     def v_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """For each joint velocity of the path, return the index in the robot's joint velocities `v`."""
+        """Return the index in the robot's joint velocities `v` for each coordinate of the path."""
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
     def select(self, tree: KinematicTree, q: Given) -> FloatArray:
-        """Select this path's coordinates (..., coordinates) in the robot's configuration `q` (..., nq).
-
-        Raises:
-            InputError: the last axis of `q` does not have the length nq.
-        """
+        """Return this path's coordinates (..., coordinates) in the robot's configuration `q` (..., nq)."""
         return numbers(tree, q, "q")[..., list(self.q_index(tree))]
 
 

@@ -29,12 +29,7 @@ _IDENTITY = np.eye(4)
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A rotation about, or a translation along, a coordinate axis of the current frame.
-
-    Attributes:
-        axis: Index of the coordinate axis: 0 for x, 1 for y, 2 for z.
-        turns: Whether the motion is a rotation.
-    """
+    """A rotation about a coordinate axis (0 is x, 1 is y, 2 is z) of the current frame, or a translation."""
 
     axis: int
     turns: bool
@@ -42,17 +37,13 @@ class Motion:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Path:
-    """A product of constant poses and elementary motions.
+    """A product of constant poses (4, 4) and elementary motions, first to last.
 
-    Attributes:
-        steps: Constant poses (4, 4) and motions, first to last.
-
-    Example:
-        >>> arm = Path((Motion(2, turns=True), elementary(0, False, 2.0)))
-        >>> arm.poses([np.pi / 2])[:3, 3].round(12).tolist()
-        [0.0, 2.0, 0.0]
-        >>> arm.columns([0.0])[1].ravel().tolist()
-        [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
+    >>> arm = Path((Motion(2, turns=True), elementary(0, False, 2.0)))
+    >>> arm.poses([np.pi / 2])[:3, 3].round(12).tolist()
+    [0.0, 2.0, 0.0]
+    >>> arm.columns([0.0])[1].ravel().tolist()
+    [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
     """
 
     steps: tuple[FloatArray | Motion, ...]
@@ -84,15 +75,12 @@ class Path:
         """Return the pose (..., 4, 4) at the end of the path for the numbers x_k (..., motions), rad or m."""
         amounts = np.asarray(amounts, np.float64)
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
-        for T in self._after_each_step(amounts):  # noqa: B007  the last one is the result
+        for T in self._after_each_step(amounts):  # noqa: B007  the last pose is the result
             pass
         return np.array(T)
 
     def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular].
-
-        Column k is the derivative with respect to x_k.
-        """
+        """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular]."""
         return self.columns_at(self.frames(amounts))
 
     def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -113,10 +101,7 @@ class Path:
 
 
 def elementary(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
-    """Return the poses (..., 4, 4) of a rotation about a coordinate axis, or of a translation along it.
-
-    The amounts (...) are angles in rad or distances in m.
-    """
+    """Return the poses (..., 4, 4) of rotations (rad) about, or translations (m) along, a coordinate axis."""
     amount = np.asarray(amount, np.float64)
     T = np.tile(_IDENTITY, (*amount.shape, 1, 1))
     return _moved(T, Motion(axis, turns), amount) if amount.any() else T

@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: The part of the array q, v or a from the first number of a joint to the end.
+#: This part of q, v or a begins with the first number of a joint.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -47,9 +47,9 @@ class Column:
         z: The joint's axis.
         turns: Whether the joint is revolute.
         carrier: State of the frame that the joint's axis is fixed to.
-        order: Position of the column's joint on the path, counted from the base.
+        order: Position of the joint on the path, counted from the base.
         place: Index of the joint velocity in v.
-        factor: Multiplier of the mimic rule, by which the joint velocity is multiplied.
+        factor: Multiplier of the mimic rule.
     """
 
     z: Vector
@@ -64,20 +64,14 @@ class Column:
 class Recursion:
     """The steps of the recursion. Each step computes a link's state from the state of the link before it.
 
-    Attributes:
-        eq: The equations.
-        own: Whether velocities and accelerations are expressed in each link's own axes (True) or in the
-            world's axes (False).
+    If `own` is True, velocities and accelerations are expressed in each link's own axes; else in world axes.
     """
 
     eq: Any
     own: bool = False
 
     def seen(self, s: State, x: Vector) -> Vector:
-        """Convert a vector x from the link's own axes to the axes that `own` selects.
-
-        The selected axes are the link's own axes or the world axes.
-        """
+        """Convert a vector from the link's own axes to the axes that `own` selects."""
         return x if self.own else self.eq.rotate(s.R, x)
 
     def carried(self, s: State, d: Vector) -> State:
@@ -95,20 +89,13 @@ class Recursion:
         return State(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
 
     def revolute(self, s: State, axis: Vector, S: Matrix, v: Number, a: Number) -> State:
-        """Return the state after a revolute joint.
-
-        The method uses 7.129 for the angular acceleration and 7.127 for the angular velocity. Then it rotates
-        the frame by S.
-        """
+        """Return the state after a revolute joint (7.129, 7.127), whose rotation is S."""
         z = self.seen(s, axis)
         alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
         return self.turned(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
 
     def prismatic(self, s: State, axis: Vector, x: Number, v: Number, a: Number) -> State:
-        """Return the state after a prismatic joint.
-
-        The method uses 7.64 for the displacement, 7.130 for the acceleration and 7.128 for the velocity.
-        """
+        """Return the state after a prismatic joint (7.64, 7.130, 7.128)."""
         s = self.carried(s, self.eq.times(x, axis))
         z = self.seen(s, axis)
         acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
@@ -219,14 +206,10 @@ class Recursion:
                 yield of.place, by.place, of.factor * by.factor, self.in_reference(s, reference, *change)
 
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
-        """Return the derivative of a Jacobian column with respect to one joint coordinate.
+        """Return the derivative of the Jacobian column `six` with respect to the coordinate of column `by`.
 
-        Args:
-            six: The Jacobian column whose derivative is returned.
-            by: The Jacobian column of the joint that moves.
-            reference: The reference frame.
-            before: Whether the moving joint comes before the joint of the column `six` on the path, or is the
-                same joint.
+        `before` says whether the joint of `by` comes before the joint of `six` on the path, or is the same
+        joint.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

@@ -25,12 +25,10 @@ class Reference(IntEnum):
     """
 
     own_axes: bool  #: The axes of the results: the frame's axes if True, the world's axes if False.
-    #: Which point the results describe. True: the body point that is now at the world's origin. False: the
-    #: frame's origin.
+    #: Whether the results describe the body point that is now at the world's origin, not the frame's origin.
     at_world: bool
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
-        """Create a member from its number and its two properties."""
         member = int.__new__(cls, number)
         member._value_, member.own_axes, member.at_world = number, own_axes, at_world
         return member

@@ -13,18 +13,14 @@ from urdfkin.model.tree import Joint, KinematicTree
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
 #: Indices of the text columns; link and joint are columns 0 and 1.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
-#: Indices of the text columns, if the first columns are the joint, its parent link and its child link.
+#: The text columns have these indices if the first columns are joint, parent link and child link.
 _AFTER_JOINT = (1, 2, *(i + 1 for i in WORDS[2:]))
 
 
 def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
     """Return the summary of a robot for a terminal or a notebook: one table that also shows the tree.
 
-    Args:
-        tree: The robot.
-        base: Default base of a chain.
-        tip: Default tip of a chain.
-        order: A sentence that says how the joints are ordered; it is printed below the table.
+    `order` is a sentence that says how the joints are ordered; it is printed below the table.
     """
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]
@@ -52,9 +48,6 @@ class Joints(dict[str, Joint], Displayable):
     def __init__(self, tree: KinematicTree) -> None:
         super().__init__((joint.name, joint) for joint in tree.joints)
         self._tree = tree
-
-    def __str__(self) -> str:
-        return self._sheet().text()
 
     def _sheet(self) -> TextDocument:
         tree = self._tree

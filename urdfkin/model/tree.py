@@ -1,9 +1,9 @@
 """The robot model: a tree of links and joints, with the joint limits and mimic rules of the URDF.
 
-`KinematicTree` depends neither on XML nor on Pinocchio. The links and joints of the tree are in
-Pinocchio's order (depth first, sibling joints by name), so `q` and `v` have the same order in urdfkin and in
-Pinocchio. The frame of a link or a joint has
-its name; the prefix `link:` or `joint:` is needed if a link and a joint have equal names.
+`KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order: depth
+first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. The
+frame of a link or a joint has its name; the prefix `link:` or `joint:` is needed if a link and a joint have
+equal names.
 """
 
 from __future__ import annotations
@@ -40,24 +40,20 @@ class FrameName(str):
 
     @classmethod
     def of(cls, own: str) -> Self:
-        """Return the frame name, with the prefix, of the link or joint with the name `own`."""
         return cls(f"{cls.prefix}{own}")
 
     @property
     def own(self) -> str:
-        """The link's or joint's own name, without the prefix."""
         return self[len(self.prefix) :]
 
 
 class LinkFrame(FrameName):
-    """The name `link:NAME` of a link's frame."""
-
     __slots__ = ()
     prefix = "link:"
 
 
 class JointFrame(FrameName):
-    """The name `joint:NAME` of a joint's frame, which is the frame of the joint's child link."""
+    """The name of a joint's frame, which is the frame of the joint's child link."""
 
     __slots__ = ()
     prefix = "joint:"
@@ -98,7 +94,6 @@ class JointKind(Enum):
     bounded: bool  #: Whether a URDF gives such a joint a lower and an upper limit.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
-        """Create a member. A member needs all six properties."""
         member = object.__new__(cls)
         member._value_ = word
         member.nq, member.nv, member.nq_pinocchio, member.has_axis, member.turns, member.bounded = properties
@@ -122,11 +117,10 @@ class Limit:
     effort: float
 
 
-#: Largest plausible joint angle, radians. The angle is more than one turn, because some industrial wrists
-#: turn 400 degrees.
+#: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
-#: A value is far outside a joint's limits if it exceeds a limit by more than the larger of two amounts:
-#: `_OUTSIDE` (rad or m), and the fraction `_OF_RANGE` of the joint's range.
+#: A value is far outside a joint's limits if it exceeds a limit by more than the larger of two amounts.
+#: They are `_OUTSIDE` (rad or m), and the fraction `_OF_RANGE` of the joint's range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
@@ -141,7 +135,6 @@ def far_outside(lower: float, upper: float) -> tuple[float, float]:
 
 
 def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
-    """Return whether there is a limit with finite `lower` and `upper`."""
     return limit is not None and math.isfinite(limit.lower) and math.isfinite(limit.upper)
 
 
@@ -167,14 +160,12 @@ class Joint:
     """One joint and its pose in the parent link.
 
     Attributes:
-        name: Name in the URDF.
-        kind: Kind of the joint.
         parent: Index of the parent link in `KinematicTree.links`.
         T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, in metres. The
             child link's frame is the joint frame after the motion.
         axis: (3,) unit axis in the joint frame; (1, 0, 0) if the kind has no axis.
-        limit: Limits of the joint; None if the joint has no limits.
-        mimic: Mimic rule of the joint; None if the joint has its own coordinate.
+        limit: None if the joint has no limits.
+        mimic: None if the joint has its own coordinate.
         tilt: Angle (rad) between the joint's axis in Pinocchio and `axis` (URDF514), usually 0. No result of
             urdfkin uses this angle, but it may increase the differences from Pinocchio.
         lock: The original joint and its value, if the user fixed a moving joint of the URDF; else None.
@@ -216,16 +207,12 @@ class Joint:
 
     @property
     def unlocked(self) -> Joint:
-        """The joint as the URDF describes it, before a lock."""
         return self.lock.joint if self.lock else self
 
     @property
     def length(self) -> float:
-        """Length (m) of the joint's offset from its parent link.
-
-        If the joint is a locked prismatic joint, the length includes its displacement.
-        """
-        # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids this.
+        """Length (m) of the offset from the parent link, with a locked prismatic joint's displacement."""
+        # The squares of 1e-200 or 1e200, which a URDF may contain, underflow or overflow; hypot avoids this.
         own = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
         return (
             own + abs(self.lock.value) if self.lock and self.lock.joint.kind is JointKind.PRISMATIC else own
@@ -244,9 +231,6 @@ class Lock:
     joint: Joint
     q: float
 
-    def __reduce__(self) -> tuple[type[Lock], tuple[Any, ...]]:
-        return type(self), (self.joint, self.q)
-
     @property
     def value(self) -> float:
         """The joint's own value, rad or m."""
@@ -259,7 +243,7 @@ class Lock:
         T, axis, value = np.eye(4), self.joint.axis, self.value
         if not self.joint.kind.turns:
             T[:3, 3] = value * axis
-        elif np.count_nonzero(axis) == 1:  # the zeros and ones of this rotation are exact
+        elif np.count_nonzero(axis) == 1:  # The zeros and ones of this rotation are exact.
             k = int(np.flatnonzero(axis)[0])
             T[:3, :3] = coordinate_rotation(k, np.array(axis[k] * value))
         else:
@@ -267,7 +251,6 @@ class Lock:
         return T
 
     def fixed(self) -> Joint:
-        """Return the locked joint as a fixed joint at its value."""
         joint = self.joint
         T = joint.T_parent_joint @ self.motion
         return replace(joint, kind=JointKind.FIXED, T_parent_joint=T, limit=None, mimic=None, lock=self)
@@ -283,8 +266,7 @@ class KinematicTree:
         joints: Every joint, fixed ones too; the parent link of a joint always comes before its child link.
         poses: Named poses, each with values for some of the joints. Named poses do not affect the motion.
 
-    Raises:
-        InputError: the joint order is wrong, a name is not unique, or a mimic rule is invalid.
+    A wrong order of the joints, a repeated name or an invalid mimic rule raises InputError.
     """
 
     name: str
@@ -339,15 +321,12 @@ class KinematicTree:
 
     @cached_property
     def q_index(self) -> tuple[int, ...]:
-        """Index of each joint's first coordinate in `q`.
-
-        A mimic joint has the index of the joint it mimics.
-        """
+        """Index of each joint's first coordinate in `q`; a mimic joint has that of the joint it mimics."""
         return self._offsets([joint.nq for joint in self.joints])
 
     @cached_property
     def v_index(self) -> tuple[int, ...]:
-        """Index of each joint's first velocity in `v`; a mimic joint has the index of the joint it mimics."""
+        """Index of each joint's first velocity in `v`; a mimic joint has that of the joint it mimics."""
         return self._offsets([joint.nv for joint in self.joints])
 
     def _offsets(self, sizes: Sequence[int]) -> tuple[int, ...]:
@@ -359,7 +338,7 @@ class KinematicTree:
 
     @cached_property
     def plausible_angles(self) -> FloatArray:
-        """Lower and upper ends (2, nq) of plausible angles in radians; infinite for all other coordinates."""
+        """Lower and upper ends (2, nq) of plausible angles, rad; infinite for all other coordinates."""
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
@@ -383,23 +362,18 @@ class KinematicTree:
         return {name: i for i, name in enumerate(self.links)}
 
     def joint_index(self, name: str) -> int:
-        """Return the index of a joint by name; raises UnknownNameError with the nearest names."""
         if (index := self._joint_index.get(name)) is None:
             raise UnknownNameError("joint", name, self._joint_index, where=self.name)
         return index
 
     def link_index(self, name: str) -> int:
-        """Return the index of a link by name; raises UnknownNameError with the nearest names."""
         if (index := self._link_index.get(name)) is None:
             raise UnknownNameError("link", name, self._link_index, where=self.name)
         return index
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
-        """Names of all links and joints, root first, without duplicates, as Pinocchio names its frames.
-
-        A joint's frame is its child link's frame: in a URDF the two are the same by definition.
-        """
+        """Names of all links and joints, root first, without duplicates, as Pinocchio names its frames."""
         names = [self.links[0]]
         for joint, child in zip(self.joints, self.links[1:], strict=True):
             names += [joint.name, child]
@@ -407,23 +381,18 @@ class KinematicTree:
 
     @cached_property
     def link_frames(self) -> tuple[LinkFrame, ...]:
-        """Unambiguous names (`link:NAME`) of all links, root first."""
         return tuple(LinkFrame.of(name) for name in self.links)
 
     @cached_property
     def joint_frames(self) -> tuple[JointFrame, ...]:
-        """Unambiguous names (`joint:NAME`) of all joints, in order."""
         return tuple(JointFrame.of(joint.name) for joint in self.joints)
 
     def frame_link(self, name: str) -> int:
         """Return the index of the link that carries the frame `name`.
 
         A link or joint with exactly this name is found first. Otherwise `link:NAME` selects the link and
-        `joint:NAME` the joint.
-
-        Raises:
-            UnknownNameError: nothing has this name; the message lists the nearest names.
-            InputError: a link and a joint at different places share the name.
+        `joint:NAME` the joint. An unknown name raises UnknownNameError; a name of a link and of a joint at
+        different places raises InputError.
         """
         if not isinstance(name, str):
             raise InputError(
@@ -472,10 +441,7 @@ class KinematicTree:
         return [str(name) for name in names if name not in known][:1]
 
     def frame_name(self, link: int) -> str:
-        """Return a name for which `frame_link` returns this link.
-
-        It is the link's own name, or a `LinkFrame` if the joint of another link has the same name.
-        """
+        """Return the link's own name, or a `LinkFrame` if the joint of another link has the same name."""
         name = self.links[link]
         joint = self._joint_index.get(name)
         return name if joint is None or joint + 1 == link else self.link_frames[link]
@@ -497,13 +463,9 @@ class KinematicTree:
 
 
 def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
-    """Return the tree with a new root link `universe` and a joint `root_joint` to the old root link.
+    """Return the tree with a planar or floating joint `root_joint` from a new root link `universe`.
 
     Pinocchio uses the same two names.
-
-    Args:
-        tree: The robot.
-        kind: `JointKind.FLOATING` or `JointKind.PLANAR`.
     """
     for known, name in ((tree.links, "universe"), ([joint.name for joint in tree.joints], "root_joint")):
         if name in known:
@@ -518,7 +480,6 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
 
 
 def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree:
-    """Return the tree with given tilts of some joints, by name (`Joint.tilt`)."""
     joints = (replace(joint, tilt=tilts.get(joint.name, 0.0)) for joint in tree.joints)
     return KinematicTree(tree.name, tree.links, tuple(joints))
 
@@ -531,12 +492,9 @@ def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) ->
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Return the tree with some joints, and the joints that mimic them, fixed at given values.
+    """Return the tree with some joints, and the joints that mimic them, fixed at given values (rad or m).
 
-    Args:
-        tree: The robot.
-        values: Value (rad or m) of each joint to fix, by name. Only a joint with exactly one coordinate can
-            be fixed.
+    Only a joint with exactly one coordinate can be fixed.
     """
     leaders = [joint.mimic.leader if joint.mimic else joint.name for joint in tree.joints]
     joints = [
@@ -552,22 +510,15 @@ def freed(tree: KinematicTree) -> KinematicTree:
 
 
 def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -> KinematicTree:
-    """Return the tree of some joints, ordered as in Pinocchio (depth first, siblings by name).
+    """Return the tree of triples (joint, parent link, child link), in Pinocchio's order.
 
-    Args:
-        name: The robot's name.
-        root: The root link.
-        joints: Triples (joint, parent link, child link) in any order; the attribute `parent` of a joint is
-            ignored.
-
-    Raises:
-        InputError: a joint cannot be reached from the root.
+    The attribute `parent` of a given joint is ignored. A joint that cannot be reached raises InputError.
     """
     below: dict[str, list[tuple[Joint, str]]] = {}
     for joint, parent, child in joints:
         below.setdefault(parent, []).append((joint, child))
     links, ordered = [root], list[Joint]()
-    # An explicit stack: a chain of 50,000 links would exceed the interpreter's recursion limit.
+    # The function uses a stack: a chain of 50,000 links would exceed the interpreter's recursion limit.
     stack = [(0, joint, child) for joint, child in _last_name_first(below.get(root, []))]
     while stack:
         parent_index, joint, child = stack.pop()
@@ -587,9 +538,7 @@ def _last_name_first(joints: list[tuple[Joint, str]]) -> list[tuple[Joint, str]]
 
 
 def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
-    """Return the pose (4, 4) with a rotation (3, 3) and an origin (3,), m.
-
-    By default the rotation is the identity and the origin is zero.
+    """Return the pose (4, 4) with a rotation (by default the identity) and an origin (by default zero), m.
 
     >>> pose(p=[1.0, 2.0, 3.0])[:3, 3].tolist()
     [1.0, 2.0, 3.0]
@@ -603,10 +552,7 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 
 
 def is_rigid(T: FloatArray, tolerance: float) -> bool:
-    """Return whether a matrix (4, 4) is a rigid transform.
-
-    The upper left block of the matrix must be a rotation matrix within `tolerance`.
-    """
+    """Return whether a matrix (4, 4) is a rigid transform, with a rotation matrix within `tolerance`."""
     return bool(rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 

@@ -82,11 +82,11 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes. Pinocchio and MuJoCo have the same default.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations at which the usual rank of a Jacobian is computed.
+#: The usual rank of a Jacobian is computed at this number of random configurations.
 _GENERIC = 3
-#: Members for internal use, hidden from name completion.
+#: Name completion hides these members for internal use.
 _INSIDE = {"plan", "verifier"}
-#: Largest number of float64 values in an array, because its number of bytes must fit in 63 bits.
+#: The number of bytes of an array must fit in 63 bits, which allows this number of float64 values.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
@@ -163,17 +163,15 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: For a USD stage with numbers in single precision: bounds on the resulting errors of link and joint
-        #: poses. None if the numbers have double precision.
+        #: A USD stage in single precision has bounds on the errors of poses; None means double precision.
         self.single: SinglePrecision | None = None
-        #: For a robot from a USD stage: the path of the prim of each link.
+        #: If the robot is from a USD stage, each link has the path of its prim.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: Fast evaluators of frames. Those in `_prepared` do not check results, and those in `_checked` check
-        #: each result.
+        #: Fast evaluators of frames: those in `_prepared` do not check results, those in `_checked` do.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
@@ -405,10 +403,7 @@ class Robot(Displayable):
         return self._tip_frame
 
     def _default_frame(self) -> str:
-        """Return the tip that the catalogue names, or the only leaf link.
-
-        Raise InputError if there are several leaves.
-        """
+        """Return the tip that the catalogue names, or the only leaf; raise InputError for several leaves."""
         if not self._has_one_tip:
             leaves = [self.tree.frame_name(leaf) for leaf in self.tree.leaves()]
             raise InputError(
@@ -524,7 +519,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        found = configuration.checked(self.tree, q, "q", look=False)  # limit_violations asks about degrees
+        found = configuration.checked(self.tree, q, "q", look=False)  # The lines already ask about degrees.
         return configuration.limit_violations(self.tree, found)
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
@@ -665,7 +660,7 @@ class Robot(Displayable):
         (12,)
         """
         with importing:
-            from urdfkin.model.conventions import Conversion, find_convention  # noqa: PLC0415  nothing is paid without one
+            from urdfkin.model.conventions import Conversion, find_convention  # noqa: PLC0415
 
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
 
@@ -780,11 +775,8 @@ class Robot(Displayable):
         >>> arm.placement([[0.0, 0.0], [0.1, 0.2]], ["link_2", "tip"]).shape
         (2, 2, 4, 4)
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, _ALIGNED, verify))
-            and (one := fast._placement(q, out)) is not None
-        ):
+        fast = self._fast(frame, _ALIGNED, base, verify, threads)
+        if fast and (one := fast._placement(q, out)) is not None:
             return one
         return self._computed("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
 
@@ -813,10 +805,10 @@ class Robot(Displayable):
         [0.4, 0.0, 0.0]
         """
         with importing:
-            from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need these imports
+            from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need it
 
         name = as_str(relative_to, "relative_to")
-        # an error message contains a line that repeats the call, with plain strings
+        # An error message contains a line that repeats the call, with plain strings.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
@@ -846,11 +838,8 @@ class Robot(Displayable):
         >>> arm.velocity([0.0, 0.0], {"joint_1": 1.0, "joint_2": 0.0}).round(6).tolist()
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, reference, verify))
-            and (one := fast._velocity(q, v, out)) is not None
-        ):
+        fast = self._fast(frame, reference, base, verify, threads)
+        if fast and (one := fast._velocity(q, v, out)) is not None:
             return one
         return self._computed("velocity", (q, v), frame, reference, base, out, verify, threads)
 
@@ -876,11 +865,8 @@ class Robot(Displayable):
         >>> J[:2].round(6).tolist()
         [[-0.4, -0.4], [0.5, 0.0]]
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, reference, verify))
-            and (one := fast._jacobian(q, out)) is not None
-        ):
+        fast = self._fast(frame, reference, base, verify, threads)
+        if fast and (one := fast._jacobian(q, out)) is not None:
             return one
         return self._computed("jacobian", (q,), frame, reference, base, out, verify, threads)
 
@@ -946,11 +932,8 @@ class Robot(Displayable):
         >>> H[0].tolist()  # x row, m/rad: the second derivatives of x = 0.5 cos q1 + 0.4 cos(q1 + q2)
         [[-0.9, -0.4], [-0.4, -0.4]]
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, reference, verify))
-            and (one := fast._hessian(q, out)) is not None
-        ):
+        fast = self._fast(frame, reference, base, verify, threads)
+        if fast and (one := fast._hessian(q, out)) is not None:
             return one
         return self._computed("hessian", (q,), frame, reference, base, out, verify, threads)
 
@@ -981,11 +964,8 @@ class Robot(Displayable):
         >>> arm.acceleration([0.0, 0.0], [1.0, 0.0], [0.0, 0.0]).round(6).tolist()  # -w^2 r, r = 0.9 m
         [-0.9, 0.0, 0.0, 0.0, 0.0, 0.0]
         """
-        if (
-            (base is None and threads is None)
-            and (fast := self._fast(frame, reference, verify))
-            and (one := fast._acceleration(q, v, a, out)) is not None
-        ):
+        fast = self._fast(frame, reference, base, verify, threads)
+        if fast and (one := fast._acceleration(q, v, a, out)) is not None:
             return one
         return self._computed("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
 
@@ -1142,7 +1122,7 @@ class Robot(Displayable):
                 near.append((error.distance, part.start + error.sample[0]))
 
         with importing:
-            from urdfkin.compiled.evaluate import in_parts  # noqa: PLC0415  few calls need this import
+            from urdfkin.compiled.evaluate import in_parts  # noqa: PLC0415  few calls need it
 
         in_parts(compute, call.n, threads)
         if near:
@@ -1251,7 +1231,7 @@ class Robot(Displayable):
         True
         """
         with importing:
-            from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  loads python-flint
+            from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  it loads python-flint
 
         frame = self._default_frame() if frame is None else frame
         inputs, hessian = (q, v, a), as_bool(hessian, "hessian")
@@ -1308,7 +1288,7 @@ class Robot(Displayable):
         [0.9, 0.0, 0.0]
         """
         with importing:
-            from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  rarely used
+            from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  few calls need it
 
         frame = self._default_frame() if frame is None else frame
         self.tree.frame_link(frame)
@@ -1395,7 +1375,7 @@ class Robot(Displayable):
         True
         """
         with importing:
-            from urdfkin.export.python import need_torch, torch_module  # noqa: PLC0415  rarely used
+            from urdfkin.export.python import need_torch, torch_module  # noqa: PLC0415  few calls need it
 
         need_torch()
         return torch_module(self.export("torch", frame, quantities, reference, verify=verify))
@@ -1625,20 +1605,22 @@ class Robot(Displayable):
         return result
 
     def _sampled(self, frame: str) -> FloatArray:
-        """Return Jacobians (n, 6, nv) of a frame at random configurations.
-
-        They are neither checked nor recorded.
-        """
+        """Return unchecked Jacobians (n, 6, nv) of a frame at random configurations."""
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_GENERIC),))
         found: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
         return found[:, 0]
 
     def _fast(
-        self, frame: str | Sequence[str] | None, reference: Reference | str, verify: Verify | None
+        self,
+        frame: str | Sequence[str] | None,
+        reference: Reference | str,
+        base: BaseMotion | None,
+        verify: Verify | None,
+        threads: int | None,
     ) -> PreparedFrame | None:
         """Return the fast evaluator for a call; None if the call needs the general code."""
         wanted = self.verifier.policy if verify is None else verify
-        if wanted is not True and wanted is not False:
+        if base is not None or threads is not None or (wanted is not True and wanted is not False):
             return None
         if frame is None:
             frame = self._default_frame()
@@ -1651,16 +1633,15 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         """Return the fast evaluator of a frame, which is made at the first call."""
-        # If the reference frame is the default and `frame` is a string, this string is the dictionary's key.
-        # This saves time, because the hash of an enumeration member is slow. Other keys also contain the
-        # types: an enumeration member would otherwise equal its number, and `LinkFrame("link:a")` would equal
-        # the name "link:a".
+        # The plain name is the key in most cases, because the hash of an enumeration member is slow.
+        # Other keys also contain the types: an enumeration member would otherwise equal its number.
+        # Without its type, `LinkFrame("link:a")` would equal the name "link:a".
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
         try:
             prepared = known.get(key)
-        except TypeError:  # not hashable, therefore not a valid name
+        except TypeError:  # The key is not hashable, so the name is not valid.
             self.tree.frame_link(frame)
             return self._prepare(frame, Reference.of(reference), verify=verify)
         if prepared is None:
@@ -1671,8 +1652,7 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: Regular expressions for items of a list: in the docstring of `Robot`, and in the section `Args` or `Raises`
-#: of a method.
+#: The docstring of `Robot` has lists of shared items; a method has the sections `Args` and `Raises`.
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
@@ -1680,7 +1660,7 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
     """Return the docstring of a method of `Robot`, completed with the shared arguments and errors.
 
-    The dictionary `QUANTITIES` contains the shape, the units and the equations of the result.
+    `QUANTITIES` contains the shape, the units and the equations of the result.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)
@@ -1706,10 +1686,7 @@ def _indented(items: Sequence[str]) -> str:
 
 
 def _complete_docstrings() -> None:
-    """Add the descriptions of shared arguments and errors to the methods' docstrings.
-
-    `Robot.__doc__` contains them.
-    """
+    """Add the shared arguments and errors of `Robot.__doc__` to the methods' docstrings."""
     arguments, _, errors = cleandoc(Robot.__doc__ or "").partition("They share these errors:")
     shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
     for method in vars(Robot).values():

@@ -130,10 +130,7 @@ class ConventionRobot:
     def _call(
         self, method: Callable[..., FloatArray], given: tuple[Any, ...], *more: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Convert the target program's inputs and call a method of `Robot`.
-
-        Return the converted inputs and the result of the method.
-        """
+        """Return the inputs in urdfkin's convention, and the result of a method of `Robot` for them."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).read(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", given, strict=False)

@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
-#: Codes of findings that only help the author of a URDF file.
-#: These findings are not reported for a URDF that urdfkin generates.
+#: These findings only help the author of a URDF file. They are not reported for generated URDFs.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
@@ -49,7 +48,7 @@ class How(TypedDict):
     joints: Sequence[str] | None
 
 
-def load(  # noqa: PLR0911  one branch per kind of source
+def load(  # noqa: PLR0911  each kind of source has a branch
     source: Source | DHTable | ProductOfExponentials | ModuleType | XmlElement | XmlTree,
     *,
     verify: Verify = True,
@@ -130,7 +129,7 @@ def load(  # noqa: PLR0911  one branch per kind of source
         raise InputError("`variant` and `articulation` need the path of a USD file", found=safe_repr(source))
     if is_urdf_path(source) or (isinstance(source, str) and entry_of(source)):
         return robot_of(read_source(source, xacro_args=xacro_args), **how)
-    from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415  not needed for a URDF
+    from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415  a URDF does not need it
     from urdfkin.dh.screws import ProductOfExponentials  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
     from urdfkin.urdf.catalogue import described  # noqa: PLC0415
@@ -189,8 +188,7 @@ def _load_table(
     text = Text(urdf.encode(), name, name)
     robot = robot_of(text, **how, made=True, table=True)
     if checked_choice(how["verify"]):
-        plain = _is_plain(robot)
-        verifier = (robot if plain else robot_of(text)).verifier
+        verifier = _plain(robot, text).verifier
         if isinstance(table, ProductOfExponentials):
             check_screws(verifier, table)
         else:
@@ -219,8 +217,7 @@ def _load_mjcf(
     listed = of_mjcf(read.listed, name, data.removeprefix(codecs.BOM_UTF8))
     robot = robot_of(text, **how, listed=listed, made=True)
     if wanted:
-        plain = _is_plain(robot)
-        verifier = (robot if plain else robot_of(text, listed=listed, made=True)).verifier
+        verifier = _plain(robot, text, listed=listed, made=True).verifier
         robot.verifier.reading = check_mjcf_source(verifier, read)
     return robot
 
@@ -265,18 +262,15 @@ def _load_usd(
     return robot
 
 
-def _is_plain(robot: Robot) -> bool:
-    """Return whether the robot has no added root joint, no locked joint and all of its mimic rules."""
+def _plain(robot: Robot, text: Text, **options: Any) -> Robot:
+    """Return the robot of a text without a root joint, without locks and with all of its mimic rules."""
     origin = robot.origin
-    return origin.mimic is not False and origin.root_joint is None and not origin.lock
+    plain = origin.mimic is not False and origin.root_joint is None and not origin.lock
+    return robot if plain else robot_of(text, **options)
 
 
 def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
-    """Return the bytes of an MJCF source, from which its SHA-256 digest is computed.
-
-    Raises:
-        SourceError: the file cannot be read or is too large.
-    """
+    """Return the bytes of an MJCF source, from which its SHA-256 digest is computed."""
     from urdfkin.urdf.mjcf import is_text  # noqa: PLC0415
 
     if isinstance(source, bytes):
@@ -295,8 +289,7 @@ def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unp
     text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
     robot = robot_of(text, **how, made=True)
     if checked_choice(how["verify"]):
-        plain = _is_plain(robot)
-        verifier = (robot if plain else robot_of(text, made=True)).verifier
+        verifier = _plain(robot, text, made=True).verifier
         robot.verifier.reading = check_model_source(verifier, read, source)
     return robot
 
@@ -320,23 +313,11 @@ def robot_of(
     table: bool = False,
     quiet: bool = False,
 ) -> Robot:
-    """Return the robot of a URDF text that is already in memory.
+    """Return the robot of a URDF text that is already in memory; errors in the text raise UrdfError.
 
-    Args:
-        text: The URDF text.
-        verify: As in `load`.
-        mimic: As in `load`.
-        root_joint: As in `load`.
-        oracle: As in `load`.
-        lock: As in `load`.
-        joints: As in `load`.
-        listed: Findings about the original source, if the text was generated from another format.
-        made: Whether the text was generated, so that no file contains it.
-        table: Whether the robot was given as a Denavit-Hartenberg table or a product of exponentials.
-        quiet: Whether to issue no warnings.
-
-    Raises:
-        UrdfError: the text has errors.
+    The first six options are those of `load`. If the text was generated from another source, `made` is True,
+    and `listed` are the findings about that source. `table` says whether the source was a Denavit-Hartenberg
+    table or a product of exponentials. If `quiet` is True, no warnings are issued.
     """
     oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle

@@ -48,25 +48,16 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Shape of each array, by the array's name.
-#: The shape does not include the first axis, which is the index of the sample.
+#: Each array has a shape, which is stated without the first axis (the index of the sample).
 Shapes = Mapping[str, tuple[int, ...]]
 
 
 def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str, FloatArray]:
     """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all arrays.
 
-    Pickled objects are rejected, so no code from the file is executed.
-
-    Args:
-        path: A file of `numpy.savez`.
-        shapes: The names of the allowed arrays, with their shapes.
-        required: Names of the required arrays.
-
-    Raises:
-        SourceError: the file cannot be read, or is not an .npz file of numbers.
-        InputError: an array is unknown, is missing, has a wrong shape, or contains a number that is not
-            finite.
+    Pickled objects are rejected, so no code from the file is executed. A file that cannot be read or has no
+    numbers raises SourceError. An array that is unknown, missing, of a wrong shape or not finite raises
+    InputError.
     """
     try:
         with np.load(io.BytesIO(read_bytes(path, MOST_DATA, pipes=True)), allow_pickle=False) as archive:
@@ -119,26 +110,24 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
         )
 
 
-#: Smallest number of samples, because a second difference needs three samples.
+#: A second difference needs three samples.
 _FEWEST = 3
-#: Names of the arrays in an .npz file that contain the fields of `BaseMotion`.
+#: These arrays of an .npz file contain the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: If the rounding error of the times exceeds this fraction of the smallest time step, a note tells the user.
+#: A note tells the user if the rounding error of the times exceeds this fraction of the smallest time step.
 _TIME_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """The n samples in a file, converted to urdfkin's convention.
-
-    For example, the attribute `v` is None if the file contains no joint velocities.
+    """The n samples in a file, converted to urdfkin's convention; a missing array is None.
 
     Attributes:
         where: Name of the file.
         q: (n, nq) configurations, as they are in the file.
         t: (n,) seconds, increasing.
         v: (n, nv) joint velocities.
-        a: (n, nv) joint accelerations. The array is None if `v` is None.
+        a: (n, nv) joint accelerations; None if `v` is None.
         base: Motion of the root link for all n samples.
     """
 
@@ -205,18 +194,10 @@ class Trajectory:
 def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
     """Return a straight line in joint space between two configurations, with zero velocity at both ends.
 
-    Planar and floating joints move from start to end with a constant twist direction (a screw motion).
-
-    Args:
-        robot: The robot.
-        start: (nq,) rad, m.
-        end: (nq,) rad, m. A continuous joint moves by `end - start`, also if this is more than one turn.
-            Planar and floating joints turn by at most half a turn.
-        duration: Seconds.
-        samples: Number of samples, including both ends.
-
-    Raises:
-        InputError: the duration is not positive, or there are fewer than three samples.
+    Planar and floating joints move from start to end with a constant twist direction (a screw motion). They
+    turn by at most half a turn. A continuous joint moves by `end - start`, also if this is more than one
+    turn. The duration in seconds must be positive, and `samples` (with both ends) at least 3; else
+    InputError.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
@@ -241,8 +222,8 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # The joint velocities are `step` times s', and the joint accelerations are `step` times s''. The same is
-    # true for screw motions, because their velocities are expressed in the moving frame.
+    # The joint velocities are `step` times s', and the joint accelerations are `step` times s''.
+    # The same is true for screw motions, because their velocities are expressed in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -293,10 +274,7 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> Samples:
-    """Read the samples of a file, without computing missing velocities or accelerations.
-
-    `read_trajectory` describes the file and the errors.
-    """
+    """Read the samples of a file as `read_trajectory` does, but compute no missing velocities."""
     archive = path.suffix.lower() == ".npz"
     data = _arrays(path, conversion or robot) if archive else _table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")
@@ -325,8 +303,7 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
 def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
     """Return samples as a trajectory; compute v and a by central differences if they are missing.
 
-    Raises:
-        InputError: there are too few samples.
+    Too few samples raise InputError.
     """
     n = len(x.q)
     if n < _FEWEST:
@@ -340,8 +317,8 @@ def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
     if n >= 2 * _FEWEST - 1:
         half = slice(None, None, 2)
         coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # With half of the samples, the time step doubles. Then an error that is proportional to the time step
-        # doubles. An error that is proportional to the square of the time step is four times as large.
+        # With half of the samples, the time step doubles, and so does an error proportional to the time step.
+        # An error that is proportional to the square of the time step is then four times as large.
         order = 1 if x.v is None else 2
         errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -360,10 +337,9 @@ def _differences(
 
 
 def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of central differences.
+    """Estimate the largest error of central differences from all samples and from half of the samples.
 
-    `fine` contains the differences from all samples, and `coarse` those from half of the samples. The error
-    of the differences is proportional to the time step to the power `order`.
+    The error of the differences is proportional to the time step to the power `order`.
     """
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
@@ -381,7 +357,6 @@ def _time_notes(t: FloatArray, *, given: bool) -> Iterator[str]:
 
 
 def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str, FloatArray]:
-    """Return the arrays t, q, v and a that a CSV file contains."""
     names: dict[str, list[str]] = {}
     units = {"t": "s"}
     for x, prefix in (("q", ""), ("v", "v:"), ("a", "a:")):
@@ -401,11 +376,7 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return a dictionary from the names of coordinates or joint velocities to units such as "rad" or "m/s".
-
-    The argument `letter` selects coordinates ("q"), joint velocities ("v") or joint accelerations ("a"). The
-    unit of a quaternion's component is "".
-    """
+    """Return the unit of each number of "q", "v" or "a" by its name, such as "m/s"; "" for quaternions."""
     layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -459,8 +430,7 @@ def _columns(path: Path, data: Mapping[str, FloatArray], names: Sequence[str]) -
 
 
 def _gradient(x: FloatArray, t: FloatArray) -> FloatArray:
-    slopes: FloatArray = np.gradient(x, t, axis=0, edge_order=2)
-    return slopes
+    return np.gradient(x, t, axis=0, edge_order=2)
 
 
 def read_columns(
@@ -473,11 +443,11 @@ def read_columns(
     named: bool = False,
     units: Mapping[str, str] | None = None,
 ) -> Mapping[str, FloatArray]:
-    r"""Parse CSV text into columns of finite numbers.
+    r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
     Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
     names of the columns, in any order. Without names, the columns are the columns in `required`, in this
-    order.
+    order. A file that does not fit raises InputError.
 
     Args:
         text: The content of the file.
@@ -488,13 +458,6 @@ def read_columns(
         named: Whether the first line must contain the names.
         units: SI unit of each column that may have a unit at the end of its heading, for example `elbow
             [deg]` or `elbow_deg`.
-
-    Returns:
-        An array (n,) for each column that is present, in SI units; n may be zero.
-
-    Raises:
-        InputError: the names are missing; a column is unknown, missing or duplicate; a unit does not fit; a
-            line has a wrong number of cells; or a cell is not a finite number in decimal digits.
 
     >>> read_columns("b,a\n1,2\n3,4\n", "x.csv", "q", ["a", "b"])["a"].tolist()
     [2.0, 4.0]
@@ -526,14 +489,14 @@ def read_columns(
     }
 
 
-#: Allowed names of the time column, each with the number of its time units in one second.
+#: Allowed names of the time column
 _TIMES = ("t", "time", "timestamp")
+#: One second has this number of units.
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: Regular expressions for CSV column names that end with a unit, for example `v:elbow_deg_s`,
-#: `a:elbow_rad_per_s2` and `elbow_deg`.
+#: CSV column names may end with a unit: `v:elbow_deg_s`, `a:elbow_rad_per_s2`, `elbow_deg`.
 _SUFFIXES = (
     re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
     re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
@@ -573,8 +536,7 @@ def _column_name(heading: str, units: Mapping[str, str]) -> str:
 def _unit(text: str, where: str, expected: str) -> str:
     """Return the short name of a unit that a heading names; "" for the SI unit.
 
-    Raises:
-        InputError: the unit is unknown, or does not fit the column.
+    A unit that is unknown or does not fit the column raises InputError.
     """
     if expected == "s":
         if (factor := _PER_SECOND.get(text.strip().lower())) is None:
@@ -592,10 +554,7 @@ def _unit(text: str, where: str, expected: str) -> str:
 
 
 def _in_si(column: FloatArray, unit: str) -> FloatArray:
-    """Return a column in SI units.
-
-    For example, 30 in a column of degrees becomes the same double as the text `30deg` elsewhere in urdfkin.
-    """
+    """Return a column in SI units; 30 degrees become the same double as the text `30deg` elsewhere."""
     if unit == "deg":
         return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
@@ -607,11 +566,7 @@ def width_of(text: str, where: str) -> int:
 
 
 def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
-    """Parse one number for each name.
-
-    Raises:
-        InputError: the number of cells is wrong, or a cell is not a finite number.
-    """
+    """Parse one number for each name; raise InputError for a wrong number of cells or an invalid cell."""
     if len(cells) != len(names):
         raise wrong_count(names, len(cells), where)
     values = []
@@ -648,10 +603,7 @@ def _check_columns(
     required: Sequence[str],
     optional: Sequence[str],
 ) -> None:
-    """Raise InputError if a column is unknown, missing or duplicate.
-
-    `headings` are the names of the columns as they are written in the file.
-    """
+    """Raise InputError if a column is unknown, missing or duplicate; `headings` are the written names."""
     known, given = {*required, *optional}, Counter(names)
     wrong = {
         "unknown": [name for name in names if name not in known],
@@ -668,27 +620,20 @@ def _check_columns(
         )
 
 
-#: If angles were wrapped to one turn, the largest and the smallest angle differ by at most this value (rad).
+#: The largest and the smallest of angles that were wrapped to one turn differ by at most this value (rad).
 #: It includes a margin for angles that are rounded to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: If a joint turns by more than this angle (rad) between two samples, the direction of its rotation is
-#: uncertain. In the opposite direction, the joint would turn by less than twice this angle.
+#: If a joint turns by more than this angle (rad) between two samples, its direction is uncertain.
+#: In the opposite direction, the joint would turn by less than twice this angle.
 _AMBIGUOUS = math.tau / 3.0
 
-#: A smaller motion (radians or metres) of a mimic joint counts as rounding.
-#: The motion is caused by a whole turn of the mimicked joint.
+#: A smaller motion (rad or m) of a mimic joint, by a whole turn of its mimicked joint, counts as rounding.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Unwrapped:
-    """Unwrapped configurations.
-
-    Attributes:
-        q: (n, nq) configurations.
-        joints: Names of the joints whose coordinates were changed by unwrapping.
-        notes: Remarks for the user, one line each.
-    """
+    """Unwrapped configurations `q` (n, nq), the names of the changed joints, and remarks for the user."""
 
     q: FloatArray
     joints: tuple[str, ...]
@@ -696,15 +641,11 @@ class Unwrapped:
 
 
 def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
-    """Unwrap the angles of continuous, planar and floating joints.
+    """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
 
     Between two samples a joint is assumed to turn in the shorter direction. If the angles of a joint span
     more than one turn, they were not wrapped and stay unchanged. Revolute joints have limits, and their
     angles stay unchanged too.
-
-    Args:
-        tree: The robot.
-        q: (n, nq) samples in the order of time.
     """
     new, changed, notes = np.array(q), [], []
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -744,7 +685,7 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
 
 
 def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """For each floating joint, choose the signs of the quaternions so that consecutive ones are close."""
+    """Choose the signs of a floating joint's quaternions so that consecutive ones are close."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]

@@ -11,5 +11,5 @@ globals().update(vars(bound(made=compiled)))
 
 
 def __getattr__(name: str) -> Any:
-    # Python calls this function only for names that this module does not contain yet.
+    # Python calls this function only for names that this module does not contain.
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

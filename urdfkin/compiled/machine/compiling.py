@@ -39,7 +39,7 @@ from urdfkin.compiled.kept import cache_folder, compile_event, compiling
 from urdfkin.system.cache import get, put, report_damaged
 from urdfkin.system.files import read_bytes
 
-_Null: Any = NullCache  # numba has no types
+_Null: Any = NullCache  # Numba has no types.
 _Result: Any = CompileResult
 _dumps: Any = dumps
 
@@ -63,15 +63,14 @@ class KernelCache(_Null):  # type: ignore[misc]
         if (content := get(place)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # a file that another version wrote can cause any error, even if it is not damaged
+            # A file that another version wrote can cause any error, even if it is not damaged.
             except Exception as error:
                 report_damaged(place, f"{type(error).__name__}: {error}")
         self._missed()
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
-        """Write the compiled function to the cache."""
-        # code with dynamic globals contains addresses of this process, so it cannot be cached
+        # Code with dynamic globals contains addresses of this process, so it cannot be cached.
         if not cres.library.has_dynamic_globals:
             put(self._place(sig, cres.library.codegen), _dumps(cres._reduce()))
 
@@ -81,11 +80,11 @@ class KernelCache(_Null):  # type: ignore[misc]
 
 
 def function_name(function: Callable[..., int]) -> str:
-    """Return a name for a function: the last part of its module's name, followed by the function's name."""
+    """Return the last part of a function's module's name, followed by the function's name."""
     return f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
 
-_Library: Any = JITCodeLibrary  # numba has no types
+_Library: Any = JITCodeLibrary  # Numba has no types.
 _Lowering: Any = typed_passes.NativeLowering
 _Compiler: Any = CompilerBase
 _Passes: Any = PassManager
@@ -102,7 +101,7 @@ class _Part(_Library):  # type: ignore[misc]
 
     @property
     def all(self) -> list[Any]:
-        """The compiled code (LLVM library) of this part, and that of all functions which the part calls."""
+        """The LLVM libraries of this part and of all functions that the part calls."""
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
@@ -115,8 +114,8 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
         state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba identifies a compiled function by the C pointer through which Python calls it. A part has no
-        # such pointer.
+        # Numba identifies a compiled function by the C pointer through which Python calls it.
+        # A part has no such pointer.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -128,7 +127,6 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
     """A compiler that runs only the passes of Numba that the parts of kernels need."""
 
     def define_pipelines(self) -> list[Any]:
-        """Return a list that contains one pipeline of compiler passes."""
         passes = _Passes("part")
         for each in (
             untyped_passes.TranslateByteCode,
@@ -149,14 +147,16 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
         return [passes]
 
 
-_config: Any = numba.config  # Numba defines these settings at run time
+_config: Any = numba.config  # Numba defines these settings at run time.
 
-#: Options of every compiled function. The compiler must not reorder operations. The compiler fuses a product
-#: and a sum only where the module `numbers` requests it. Results therefore do not depend on the compiler.
-#: Division by zero gives inf, as in C. Loops therefore contain no branch that raises an error. The functions
-#: allocate no memory, so their arrays need no reference counts.
+#: Options of every compiled function.
+#: The compiler must not reorder operations.
+#: The compiler fuses a product and a sum only where the module `numbers` requests it.
+#: Results therefore do not depend on the compiler.
+#: Division by zero gives inf, as in C, so loops contain no branch that raises an error.
+#: The functions allocate no memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-#: Options of a part. Because a part is only inlined into kernels, it has no entry point for Python or C.
+#: Options of a part: it is only inlined into kernels, so it has no entry point for Python or C.
 _PART: dict[str, Any] = {
     "forceinline": True,
     "no_cpython_wrapper": True,
@@ -203,11 +203,10 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-#: Decorator for a function that is a part of kernels.
+#: It decorates a part of kernels.
 compiled = jitted(**_PART)
 
-# An input array may be read-only.
-# Numba also accepts a writable array for this signature, without a copy.
+# An input array may be read-only; Numba also accepts a writable array for this signature, without a copy.
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 PLACES = types.Array(types.int64, 1, "C", readonly=True)
@@ -220,9 +219,7 @@ STATES = types.Array(types.float64, 3, "C")
 class Kernel:
     """A function that is compiled, or read from disk, when it is first called.
 
-    Attributes:
-        compiled: The compiled function. Calling it directly, without `Kernel`, costs a tenth of a
-            microsecond.
+    Calling the attribute `compiled` directly, without `Kernel`, costs a tenth of a microsecond.
     """
 
     compiled: Any
@@ -232,9 +229,8 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # Python calls this for attributes that do not exist yet. Before Python 3.12, a cached property has
-        # its own lock. In a forked child process, that lock could stay locked forever. Therefore `compiled`
-        # is not a cached property.
+        # Python calls this for attributes that do not exist yet; `compiled` is not a cached property.
+        # Before Python 3.12, a cached property has a lock, which could stay locked forever in a forked child.
         if name != "compiled":
             raise AttributeError(name)
         with compiling:
@@ -249,7 +245,7 @@ class Kernel:
         return dispatcher
 
     def _compile_or_load(self, made: Any, make: Callable[[], object]) -> None:
-        """Return the compiled function: read it from disk, or compile it and inform the listeners."""
+        """Read the function from disk, or compile it and inform the listeners."""
         with compile_event(self.__name__.strip("_").replace("_", " ")) as missed, compiling_allowed():
             _skip_blas_check()
             if (folder := cache_folder()) is None:
@@ -259,7 +255,6 @@ class Kernel:
             make()
 
     def __call__(self, *arguments: Any) -> int:
-        """Call the compiled function."""
         return int(self.compiled(*arguments))
 
 
@@ -280,20 +275,10 @@ class Core(Kernel):
 
     @property
     def address(self) -> int:
-        """The address of the compiled function in this process."""
         return int(self.compiled.address)
 
     def __call__(self, *arguments: Any) -> int:
-        """Call the compiled function."""
         return int(self.compiled.ctypes(*arguments))
-
-
-def core(function: Callable[..., int]) -> Core:
-    """Return a compiled version of a function whose arguments are integers, for example memory addresses.
-
-    The function is compiled at the first call and cached on disk.
-    """
-    return Core(function)
 
 
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -302,13 +287,9 @@ def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator for a kernel with these argument types.
+    """Return a decorator for a kernel with these argument types (Numba's).
 
-    The kernel is compiled at the first call and cached on disk.
-
-    Args:
-        arguments: Numba's types.
-        nogil: Whether a call releases Python's global interpreter lock. For a call that takes a microsecond,
-            this would cost more time than it saves.
+    The kernel is compiled at the first call and cached on disk. `nogil` says whether a call releases Python's
+    global interpreter lock. For a call that takes a microsecond, this would cost more time than it saves.
     """
     return lambda function: Kernel(function, arguments, nogil)

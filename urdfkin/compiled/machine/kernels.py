@@ -1,7 +1,5 @@
 """The compiled recursions, one for each function of the module `recursions`.
 
-Each compiled function takes the address of its arguments.
-
 For a batch, a kernel computes eight configurations at a time, one in each of the eight lanes of a vector
 register. For a single configuration, the same kernel computes the same numbers in all eight lanes. A
 configuration therefore has exactly the same result in a batch as in a call with only this configuration.
@@ -13,15 +11,15 @@ from typing import Any
 
 from urdfkin.compiled import axes, outputs, recursion, recursions
 from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
-from urdfkin.compiled.machine.compiling import Core, compiled, core
+from urdfkin.compiled.machine.compiling import Core, compiled
 from urdfkin.kinematics.arithmetic import rebound
 
-#: The number types and memory functions for Numba, which replace the types and functions for Python.
+#: The number types and memory functions for Numba replace those for Python.
 _OTHERS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}
 _PARTS: dict[str, Any] = rebound(axes, recursion, outputs, made=compiled, others=_OTHERS)
-_MADE: dict[str, Core] = rebound(recursions, made=core, others=_PARTS)
+_MADE: dict[str, Core] = rebound(recursions, made=Core, others=_PARTS)
 
 placements, velocities, accelerations = (
     _MADE[name] for name in ("placements", "velocities", "accelerations")

@@ -46,10 +46,7 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the eight doubles of a row of scratch memory; return `nothing()` if they are not needed.
-
-    The caller passes `nothing()` as the argument `wanted` if the row is not needed.
-    """
+    """Return the eight doubles of a row of scratch memory, or `nothing()` if `wanted` is `nothing()`."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if isinstance(wanted, Known):
@@ -61,11 +58,7 @@ def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def put(context: Any, s: Any, row: Any, x: Any) -> Any:
-    """Write the eight doubles of x to a row of scratch memory.
-
-    If x is `nothing()`, the row is not changed. The object `nothing()` of the module `numbers` stands for a
-    number that is not needed.
-    """
+    """Write the eight doubles of x to a row of scratch memory; `nothing()` does not change the row."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         s, row, value = arguments
@@ -121,12 +114,11 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: `numbers_at` converts an address to a pointer to doubles. `whole_numbers_at` converts an address to a
-#: pointer to integers.
+#: These functions convert an address to a pointer to doubles, and to a pointer to integers.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: Largest number of doubles that are prefetched. These doubles fill half of a processor's first-level cache.
+#: At most this number of doubles are prefetched; they fill half of the first-level cache.
 _MOST_FETCHED = 3072
 _NUMBERS = types.CPointer(types.float64)
 
@@ -198,10 +190,7 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Return a function that copies `width` rows of scratch memory to an array.
-
-    The rows need not be adjacent. The array has the numbers of eight configurations.
-    """
+    """Return a function that copies `width` rows of scratch memory, for eight configurations, to an array."""
 
     @intrinsic
     def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
@@ -297,10 +286,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 
 @compiled
 def fetch(x, at, count):
-    """Load `count` numbers from `x[at]` on into the cache.
-
-    While one block of configurations is computed, this function loads the inputs of the next block.
-    """
+    """Load `count` numbers from `x[at]` on, inputs of the next block of configurations, into the cache."""
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
             _fetch(x, number)
@@ -312,8 +298,6 @@ _AHEAD = 512
 
 @intrinsic
 def _eight(context: Any, x: Any, at: Any) -> Any:
-    """Return the eight consecutive numbers from `x[at]` on as one vector."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, at = arguments
         return builder.load(_vector_at(builder, x, at, LANES), align=8)
@@ -352,8 +336,6 @@ def add_squares(total, x, at, count):
 
 @intrinsic
 def _sum(context: Any, x: Any) -> Any:
-    """Return the sum of the lanes."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         lanes = [builder.extract_element(arguments[0], ir.IntType(32)(i)) for i in range(LANES)]
         return reduce(builder.fadd, lanes)
@@ -369,10 +351,7 @@ def ordinary(total):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy a cache line of `x` to a cache line of `to`.
-
-    The copy is written to memory and not to the caches.
-    """
+    """Copy a cache line of `x` to a cache line of `to` in memory, without the caches."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments

@@ -38,10 +38,7 @@ class Lanes(types.Type):
         super().__init__(name=f"Lanes({width})")
 
     def can_convert_from(self, context: Any, other: Any) -> Any:
-        """Return Numba's code for the conversion from another type to this type, or None.
-
-        Only a `Product` of the same width can be converted.
-        """
+        """Return Numba's code for the conversion from a `Product` of the same width, else None."""
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
@@ -230,10 +227,7 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Return a number as an LLVM vector.
-
-    The number must not be `nothing()`, which stands for a number that is not needed.
-    """
+    """Return a number as an LLVM vector; it must not be `nothing()`."""
     return _Value(context, builder, kind, value).number(width)
 
 
@@ -316,10 +310,7 @@ zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
 
 @intrinsic
 def rounded(context: Any, x: Any) -> Any:
-    """Multiply the factors of a product and round the result. A later sum is then rounded separately.
-
-    Return other numbers unchanged.
-    """
+    """Multiply the factors of a product and round the result; return other numbers unchanged."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = signature.args[0]

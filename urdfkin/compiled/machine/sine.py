@@ -29,19 +29,14 @@ _2_PI = 2.0 / math.pi
 
 @compiled
 def sine_cosine(s, row, x):
-    """Return the sines and the cosines of angles.
-
-    The function may overwrite the scratch memory row with the index `row`.
-    """
+    """Return the sines and the cosines of angles; the scratch memory row `row` may be overwritten."""
     sine, cosine = _of_small(x)
     if _any_large(x):
         put(s, row, x)
         for k in range(row * LANES, (row + 1) * LANES):
             if not abs(s[k]) < LARGEST_ANGLE:
-                sine, cosine = (
-                    _with_lane(sine, k - row * LANES, math.sin(s[k])),
-                    _with_lane(cosine, k - row * LANES, math.cos(s[k])),
-                )
+                sine = _with_lane(sine, k - row * LANES, math.sin(s[k]))
+                cosine = _with_lane(cosine, k - row * LANES, math.cos(s[k]))
     return sine, cosine
 
 
@@ -76,8 +71,7 @@ def _of_small(context: Any, x: Any) -> Any:
         lost = fused(builder, n, all_lanes(-PI_2_REST), builder.fsub(near, r))
         z = builder.fmul(r, r)
         z_lost = fused(builder, r, r, builder.fneg(z))
-        # The variable `most` is 1 - z/2, the beginning of the cosine's series. Its rounding error is
-        # `most_lost`.
+        # The variable `most` is 1 - z/2, which begins the cosine's series; `most_lost` is its error.
         most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
         most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
         # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r.
@@ -93,9 +87,9 @@ def _of_small(context: Any, x: Any) -> Any:
             sign = builder.shl(builder.and_(turns, bits(2)), bits(62))
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
-        # An odd number of quarter turns exchanges sine and cosine. If the remainder of the quarter turns
-        # modulo 4 is 2 or 3, the sine changes its sign. If this remainder is 1 or 2, the cosine changes its
-        # sign.
+        # An odd number of quarter turns exchanges sine and cosine.
+        # If the remainder of the quarter turns modulo 4 is 2 or 3, the sine changes its sign.
+        # If this remainder is 1 or 2, the cosine changes its sign.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             signed(builder.select(odd, cosine, sine), quarters),

@@ -25,35 +25,29 @@ from numba import types
 from numba.extending import intrinsic
 
 from urdfkin.compiled.machine import kernels
-from urdfkin.compiled.machine.compiling import Core, compiled, core
+from urdfkin.compiled.machine.compiling import Core, compiled
 from urdfkin.compiled.machine.memory import WHOLE_NUMBERS, whole_numbers_at
 from urdfkin.compiled.plan import REFERENCES, CompiledTree, IntArray, KernelArgs, program_of, scratch
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-_CORE, _BUSY, _COUNT = int(KernelArgs.CORE), int(KernelArgs.BUSY), int(KernelArgs.COUNT)
-_Q, _OUT, _NQ, _NV, _ORDERS = (
-    int(KernelArgs.Q),
-    int(KernelArgs.OUT),
-    int(KernelArgs.NQ),
-    int(KernelArgs.NV),
-    int(KernelArgs.ORDERS),
+_CORE, _BUSY, _COUNT = map(int, (KernelArgs.CORE, KernelArgs.BUSY, KernelArgs.COUNT))
+_Q, _OUT, _NQ, _NV = map(int, (KernelArgs.Q, KernelArgs.OUT, KernelArgs.NQ, KernelArgs.NV))
+_ORDERS, _AXES, _ROWS, _COLUMNS = map(
+    int, (KernelArgs.ORDERS, KernelArgs.AXES, KernelArgs.ROWS, KernelArgs.COLUMNS)
 )
-_AXES, _ROWS, _COLUMNS = int(KernelArgs.AXES), int(KernelArgs.ROWS), int(KernelArgs.COLUMNS)
 
-#: Number of words (of eight bytes) in the header of a Python object.
+#: The header of a Python object has this number of 8-byte words.
 _OWN = object.__basicsize__ // 8
-#: Positions of 8-byte words in memory: the word with the type of an object, and the word with the first item
-#: of a tuple.
+#: `_TYPE` is the 8-byte word with an object's type, `_ITEMS` that with the first item of a tuple.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
-#: Indices of 8-byte words in a NumPy array (the C structure PyArrayObject_fields). The number of axes and the
-#: flags are numbers of four bytes.
+#: These 8-byte words of a NumPy array follow the C structure PyArrayObject_fields.
+#: The number of axes and the flags are numbers of four bytes.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
 #: In the C structure PyArray_Descr (an element type), one word has the byte order and the type number.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
-#: NumPy's flags for the arrays: an input array is C-contiguous and aligned. An output array must also be
-#: writable.
+#: NumPy's flags: an input array is C-contiguous and aligned, and an output array is also writable.
 _READABLE, _WRITABLE = 0x101, 0x501
 
 _incref = types.ExternalFunction("Py_IncRef", types.void(types.int64))
@@ -96,10 +90,7 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 @compiled
 def _doubles_address(given, ndarray, flags, axes, rows, columns):
-    """Return the address of an array's doubles.
-
-    If the object is not an array of doubles with this shape and these flags, the result is 0.
-    """
+    """Return the address of an array's doubles; 0 if the object has another type, shape or flags."""
     x = whole_numbers_at(given)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
         return 0
@@ -112,15 +103,13 @@ def _doubles_address(given, ndarray, flags, axes, rows, columns):
     return x[_DATA] if alike else 0
 
 
-@core
+@Core
 def one_configuration(bound, arguments, count):
     """Compute the result for one configuration.
 
     The arguments are q, or q and v, or q, v and a. The last argument is the output array, or None for a new
-    array.
-
-    The function returns the result. It returns None if it does not support the arguments, or if another
-    thread is using the scratch memory.
+    array. The function returns None if it does not support the arguments, or if another thread is using the
+    scratch memory.
 
     Args:
         bound: Address of a tuple of Python objects. The first item is the array of kernel arguments. The next
@@ -186,10 +175,7 @@ _FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.
 
 
 def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
-    """Return a Python function that runs the code at an address.
-
-    The objects `bound` are not deleted while the function exists.
-    """
+    """Return a Python function that runs the code at an address and keeps the objects `bound` alive."""
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
     function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
@@ -198,10 +184,7 @@ def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArr
 
 @cache
 def arrays_are_known() -> bool:
-    """Return whether the installed NumPy has the memory layout of arrays that this module uses.
-
-    If the result is False, the fast function `single` must not be used.
-    """
+    """Return whether the installed NumPy has the memory layout of arrays that `single` uses."""
     x = np.zeros((2, 3))
     if np.ndarray.__basicsize__ < 8 * (_FLAGS + 1) or np.dtype.__basicsize__ < 8 * (_KIND_AND_ORDER + 1):
         return False
@@ -215,9 +198,8 @@ def arrays_are_known() -> bool:
     )
 
 
-#: For each quantity: its kernel, and its kernel for the reference frame LOCAL. The third value is the number
-#: of inputs: 1 for q, 2 for q and v, 3 for q, v and a. The fourth value is 0 for a result without an axis of
-#: length nv, 1 for a Jacobian (6, nv), and 2 for a Hessian (6, nv, nv).
+#: A quantity has a kernel, a kernel for LOCAL, a number of inputs, and a number of axes of length nv.
+#: The inputs are q, or q and v, or q, v and a.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -230,16 +212,12 @@ _HOW: dict[str, tuple[Core, Core, int, int]] = {
 def single(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a fast function that computes a quantity of one frame for one configuration.
+    """Return a function that computes a quantity for one configuration, and its kernel arguments.
 
-    The compiled tree must have only one frame, and the base must be fixed. The function is compiled or read
-    from disk.
-
-    Returns:
-        The function and its kernel arguments. The arguments of the function are q, then v and a if the
-        quantity needs them, and then the output array or None. The function returns the result, or None if it
-        does not support the arguments. The array of kernel arguments also contains a counter of the results
-        that the function has computed.
+    The compiled tree must have only one frame, and the base must be fixed. The arguments of the function are
+    q, then v and a if the quantity needs them, and then the output array or None. The function returns None
+    for arguments that it does not support. The kernel arguments also contain a counter of the results that
+    the function has computed.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
@@ -259,11 +237,7 @@ def called(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Return a function that computes one configuration with a C function instead of a kernel.
 
-    Args:
-        core: The C function, as a `ctypes` object.
-        orders: Number of inputs of the function: 1 for q, 2 for q and v, 3 for q, v and a.
-        shape: Shape of the result.
-        plan: The compiled tree, which gives the lengths of q and v.
+    `orders` is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a. `shape` is that of the result.
     """
     address = ctypes.cast(core, ctypes.c_void_p).value
     return _called(address or 0, orders, shape, plan, core)
@@ -274,10 +248,8 @@ def _called(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     task = np.zeros(len(KernelArgs), dtype=np.int64)
     task[KernelArgs.CORE], task[KernelArgs.ORDERS], task[KernelArgs.N] = address, orders, 1
-    task[KernelArgs.NQ], task[KernelArgs.NV] = (
-        plan.nq,
-        plan.nv,
-    )  # all strides are 0, because there is only one configuration
+    # All strides are 0, because there is only one configuration.
+    task[KernelArgs.NQ], task[KernelArgs.NV] = plan.nq, plan.nv
     task[KernelArgs.AXES], task[KernelArgs.ROWS], task[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = task, np.ndarray, None, np.empty, shape, *alive
     return _built_in("compute", one_configuration.address, *bound), task

@@ -1,10 +1,7 @@
-"""The textbook's equations as data.
+"""The textbook's equations as data: each has its statement, its meaning, its functions and its tests.
 
-Each equation has its statement, its meaning, its functions and its tests.
-
-The TOML files in `data` are the only source. This module generates `docs/equations.md` and the output of
-`urdfkin explain 7.130` from them. A test checks that every function and every test that these files name
-exists.
+The TOML files in `data` are the only source of `docs/equations.md` and of `urdfkin explain 7.130`. A test
+checks that every function and every test that these files name exists.
 """
 
 from __future__ import annotations
@@ -23,8 +20,8 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST = 130
-#: Numbers of the equations that are unknown, because page 2 of the chapter is lost. Equation 7.7 is on that
-#: page too, but section 7.2 repeats it.
+#: Numbers of the unknown equations: page 2 of the chapter is lost.
+#: Equation 7.7 is on that page too, but section 7.2 repeats it.
 LOST = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
@@ -68,13 +65,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A section of the chapter.
-
-    Attributes:
-        number: The printed number; for several sections, a list such as "7.2.4, 7.2.5".
-        title: The title.
-        equations: The equations in order.
-    """
+    """A section of the chapter; for several sections, `number` is a list such as "7.2.4, 7.2.5"."""
 
     number: str
     title: str
@@ -87,8 +78,6 @@ class Misprint:
 
     Attributes:
         where: The place of the misprint in the chapter.
-        printed: The printed statement.
-        correct: The correct statement.
         proof: The reason why the printed statement is wrong, in one sentence.
         test: The test that proves it, "file::name".
     """
@@ -102,33 +91,25 @@ class Misprint:
 
 @cache
 def sections() -> tuple[Section, ...]:
-    """Return the chapter's sections with their equations, in order."""
-    return tuple(_section(_read(name)) for name in _FILES)
+    return tuple(
+        Section(data["section"], data["title"], tuple(_equation(data | entry) for entry in data["equation"]))
+        for data in map(_read, _FILES)
+    )
 
 
 @cache
 def equations() -> dict[str, Equation]:
-    """Return all equations in the order of the chapter. The key is the number of the equation."""
+    """Return the equations by number, in the order of the chapter."""
     return {equation.number: equation for section in sections() for equation in section.equations}
 
 
 @cache
 def misprints() -> tuple[Misprint, ...]:
-    """Return the misprints of the chapter with their proofs."""
     return tuple(Misprint(**entry) for entry in _read("misprints")["misprint"])
 
 
 def _read(name: str) -> dict[str, Any]:
     return tomllib.loads((Path(__file__).with_name("data") / f"{name}.toml").read_text(encoding="utf-8"))
-
-
-def _section(data: dict[str, Any]) -> Section:
-    entries = tuple(_equation({**_defaults(data), **entry}) for entry in data["equation"])
-    return Section(data["section"], data["title"], entries)
-
-
-def _defaults(data: dict[str, Any]) -> dict[str, Any]:
-    return {"test_file": data["test_file"], "against": data["against"]}
 
 
 def _equation(entry: dict[str, Any]) -> Equation:
@@ -146,7 +127,7 @@ def _equation(entry: dict[str, Any]) -> Equation:
 
 
 def table() -> str:
-    """Return the text of the page docs/equations.md in Markdown."""
+    """Return the text of the page docs/equations.md."""
     parts = [_head()]
     for section in sections():
         parts += [
@@ -154,7 +135,11 @@ def table() -> str:
             "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
             + "\n".join(_row(equation) for equation in section.equations),
         ]
-    parts += ["## Misprints", _misprint_head(), *(_misprint(misprint) for misprint in misprints())]
+    parts += [
+        "## Misprints",
+        "Wrong or incomplete statements in the chapter. A test proves each one.",
+        *map(_misprint, misprints()),
+    ]
     return "\n\n".join(parts) + "\n"
 
 
@@ -196,10 +181,6 @@ def _cell(text: str) -> str:
     return text.replace("|", "\\|").replace("*", "\\*").replace("_", "\\_")
 
 
-def _misprint_head() -> str:
-    return "Wrong or incomplete statements in the chapter. A test proves each one."
-
-
 def _misprint(misprint: Misprint) -> str:
     return (
         f"* **{_cell(misprint.where)}**: “{_cell(misprint.printed)}” should be: {_cell(misprint.correct)} "
@@ -211,19 +192,10 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 
 
 def explain(number: str) -> str | None:
-    """Return a page about an equation, with its meaning, functions and tests, or None.
+    """Return a page of plain text about "7.130", "(7.130)" or "eq. 7.130"; None if there is no such equation.
 
-    The result is None if there is no equation with this number.
-
-    Args:
-        number: "7.130", "(7.130)" or "eq. 7.130".
-
-    Returns:
-        A page of plain text, or None.
-
-    Example:
-        >>> print(explain("7.5").splitlines()[2])
-        R_0_1 = R(theta1) = [[cos, -sin], [sin, cos]]
+    >>> print(explain("7.5").splitlines()[2])
+    R_0_1 = R(theta1) = [[cos, -sin], [sin, cos]]
     """
     match = _NUMBER.match(number.strip())
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST:
@@ -259,19 +231,5 @@ def _page(equation: Equation) -> str:
 
 
 def _source(name: str) -> list[str]:
-    """Return the source code of an equation's function, below a title."""
     source = textwrap.indent(inspect.getsource(getattr(chapter, name)).rstrip(), "    ")
     return ["code in urdfkin/kinematics/equations.py, and LaTeX", "", source]
-
-
-__all__ = [
-    "LOST",
-    "Equation",
-    "Misprint",
-    "Section",
-    "equations",
-    "explain",
-    "misprints",
-    "sections",
-    "table",
-]

@@ -144,7 +144,7 @@ def _built_in() -> dict[str, Convention]:
     }
 
 
-#: Names of the built-in conventions, in the order of tables; a test compares them with conventions.toml.
+#: Tables list the built-in conventions in this order; a test compares the names with conventions.toml.
 BUILT_IN = (
     "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaaclab3",
     "isaacgym", "newton", "newton-usd", "usd", "ros", "alphabetical",
@@ -154,10 +154,8 @@ BUILT_IN = (
 def find_convention(name: str | Path | Convention) -> Convention:
     """Find a convention by its name or read it from a TOML file. Return a `Convention` unchanged.
 
-    Raises:
-        UnknownNameError: there is no such convention, and no such file.
-        InputError: the file has an unknown key, an invalid value, or two columns with the same name.
-        SourceError: the file cannot be read.
+    An unknown name raises UnknownNameError, an unreadable file SourceError, and an invalid file the errors of
+    `read_convention`.
     """
     if isinstance(name, Convention):
         return name
@@ -174,12 +172,10 @@ def find_convention(name: str | Path | Convention) -> Convention:
 
 
 def read_convention(text: str, where: str, name: str) -> Convention:
-    """Return the convention of a TOML text.
+    """Return the convention of a TOML text; `name` is its name if the text has none.
 
-    Raises:
-        InputError: the text is invalid TOML, or has an unknown key, an invalid value, or two columns with the
-            same name.
-        UnknownNameError: `like` names no built-in convention.
+    Invalid TOML, an invalid value or a repeated name raises InputError; an unknown key or an unknown `like`
+    raises UnknownNameError.
     """
     try:
         found = tomllib.loads(text)
@@ -236,7 +232,6 @@ def _number(value: object, word: str, where: str) -> float:
 
 
 def _rule(rule: dict[str, Any], where: str) -> JointRule:
-    """Return a joint's rule from the joint's table in the TOML file."""
     for key in rule:
         if key not in ("name", "sign", "zero", "unit"):
             raise UnknownNameError("key", key, ("name", "sign", "zero", "unit"), where=where)
@@ -285,10 +280,7 @@ def as_toml(how: Convention) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Return a text as a quoted string of TOML.
-
-    Such a string uses the escapes of JSON. In TOML the character DEL must also be escaped.
-    """
+    """Return a text as a quoted string of TOML: with the escapes of JSON, and also an escaped DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -296,8 +288,7 @@ def _quoted(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: `transcoded` appends numbers in base 62 to a name. A digit of 31 or more is followed by another digit of
-#: the same number; a smaller digit is the last digit of its number.
+#: `transcoded` appends numbers in base 62 to a name; a digit below 31 is the last digit of its number.
 _CONTINUES = 31
 
 

@@ -1,9 +1,9 @@
 """Convert q, v, a, Jacobians and six-vectors of one robot to another program's convention, and back.
 
-The target program can be any other program or library for robots. Let M be the matrix `Conversion.matrix`,
-and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v, and J_tool = S J M^-1. S exchanges the
-linear and the angular rows if the target program has the angular rows first. M is constant unless the target
-program and urdfkin use different axes for the velocity of a floating or planar joint.
+Let M be the matrix `Conversion.matrix`, and M' its time derivative. Then v_tool = M v, a_tool = M a + M' v,
+and J_tool = S J M^-1. S exchanges the linear and the angular rows if the target program has the angular rows
+first. M is constant unless the target program and urdfkin use different axes for the velocity of a floating
+or planar joint.
 """
 
 from __future__ import annotations
@@ -25,17 +25,14 @@ from urdfkin.model.conventions.convention import Convention, JointRule, spelled
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import plain_xml
 
-#: Largest allowed difference (rad or m) between the value that a user gives for a mimic joint and the value
-#: that its mimic rule gives.
+#: A mimic joint's given value may differ from its mimic rule by this number (rad or m).
 _MIMIC_TOLERANCE = 1e-9
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """One number of the target program's q: `factor * value + zero`.
-
-    `value` is the number at the index `at` of urdfkin's q.
+    """One number of the target program's q: `factor * value + zero`, where `value` is urdfkin's `q[at]`.
 
     `part` is "cos" or "sin" for a continuous joint that the target program stores as two numbers. `copy` is
     True if the target program's q also contains mimic joints, and this number belongs to one.
@@ -52,10 +49,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """A planar or floating joint for which the target program defines another velocity.
-
-    The target program expresses the velocity in another frame, or uses the velocity of another point.
-    """
+    """A planar or floating joint whose velocity has other axes or another point in the target program."""
 
     joint: Joint
     q: int
@@ -157,16 +151,12 @@ class Conversion:
         return order
 
     def _index(self, joint: str) -> int:
-        """Return the index of a joint that the convention names."""
         if joint not in (names := [one.name for one in self.tree.joints]):
             raise UnknownNameError("joint", joint, names, where=f"{self.convention.name}, {self.tree.name}")
         return self.tree.joint_index(joint)
 
     def _follows(self, i: int) -> bool:
-        """Return whether a joint's value can be converted to a coordinate of q.
-
-        This is impossible for a mimic joint with the multiplier 0.
-        """
+        """Return whether a joint's value determines its coordinate; a mimic multiplier of 0 prevents this."""
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
 
@@ -178,9 +168,8 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        place = [
-            written.get(name, -1) for name in names
-        ]  # -1 puts the root joint, which is not in the file, first
+        # The root joint has no place in the file; -1 puts it first.
+        place = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
         if order == "file":
@@ -208,7 +197,7 @@ class Conversion:
 
         def below(link: int) -> list[int]:
             found, fixed = list[int](), [link]
-            for one in fixed:  # the loop extends this list
+            for one in fixed:  # The loop extends this list.
                 for i in children.get(one, []):
                     # Locking a joint of this robot does not weld its links in the target program.
                     if self.tree.joints[i].unlocked.kind.nv or not merged:
@@ -326,7 +315,7 @@ class Conversion:
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
         self._plain_q &= not any(c.part for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
-        # For each number of urdfkin's q, find the column of the target program's q that contains this number.
+        # Each number of urdfkin's q is in some column of the target program's q.
         # A mimic joint's column is used only if no other column contains the number.
         self._q_source = [
             min((k for k, c in enumerate(columns) if c.at == at and c.factor), key=lambda k: columns[k].copy)
@@ -390,10 +379,7 @@ class Conversion:
 
     @property
     def rate_permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `v_tool = v[..., rate_permutation]`.
-
-        The value is None if the conversion also changes the numbers, for example their unit or sign.
-        """
+        """Indices with `v_tool = v[..., rate_permutation]`; None if the conversion also changes numbers."""
         return self._v_at.copy() if self._plain_v else None
 
     @cached_property
@@ -419,17 +405,8 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
 
-        Args:
-            q: (..., nq) rad, m. The same array is returned if the target program has the same q.
-            v: (..., nv); for a floating base, its conversion depends on q.
-            a: (..., nv); its conversion depends on q and v.
-
-        Returns:
-            q, (q, v) or (q, v, a) in the target's convention, depending on the arguments. The shape of q is
-            (..., nq) with the target's nq.
-
-        Raises:
-            InputError: a wrong length, or a number that is not finite.
+        The conversion of v may depend on q, and that of a on q and v. If the target program has the same q,
+        the same array is returned. A wrong length or a number that is not finite raises InputError.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -455,9 +432,8 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's: inverse of `to`.
 
-        Raises:
-            InputError: a wrong length, a number that is not finite, or a mimic joint's value that differs
-                from its mimic rule.
+        A wrong length, a number that is not finite, or a mimic joint's value that differs from its mimic rule
+        raises InputError.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -559,7 +535,7 @@ class Conversion:
         return found
 
     def _from_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M^-1 x, or M^-1 (x - M' v) if v is given; M is `matrix` at q, and M' its time derivative."""
+        """Return M^-1 x, or M^-1 (x - M' v) if v is given; M is `matrix` at q."""
         if self._same_v:
             return x
         found: FloatArray = x[..., self._v_source]
@@ -577,12 +553,9 @@ class Conversion:
     # -- matrices ------------------------------------------------------------------------------------
 
     def matrix(self, q: Given | None = None) -> FloatArray:
-        """Return the matrix M with v_tool = M v.
+        """Return the matrix M (program's nv, nv) with v_tool = M v, or (..., program's nv, nv).
 
-        Its shape is (program's nv, nv), or (..., program's nv, nv) if M depends on q.
-
-        Raises:
-            InputError: q is missing, although M depends on it.
+        M may depend on q; if q is then missing, InputError is raised.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").convention("alphabetical").matrix().tolist()
@@ -613,11 +586,7 @@ class Conversion:
         return found
 
     def inverse_matrix(self, q: Given | None = None) -> FloatArray:
-        """Return the matrix M^-1 with v = M^-1 v_tool.
-
-        The column of a mimic joint is 0, because the velocity of the mimicked joint determines the velocity
-        of the mimic joint.
-        """
+        """Return the matrix M^-1 with v = M^-1 v_tool; the column of a mimic joint is 0."""
         if not self._blocks:
             found = np.zeros((self.tree.nv, self.nv))
             found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_scale[self._v_source]
@@ -683,11 +652,7 @@ class Conversion:
     def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
         """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1.
 
-        M is `matrix`. S exchanges the linear and the angular rows if the program has angular rows first.
-
-        Raises:
-            InputError: a column of J belongs to several joints of the target program, because one joint
-                mimics the other joint.
+        The module's docstring defines S and M; `columns` explains the error.
         """
         return self.columns(q, self.six(J, -2))
 
@@ -695,11 +660,8 @@ class Conversion:
         """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
 
         The rows of J are derivatives of quantities that are the same in both conventions, such as Euler
-        angles. M is `matrix`.
-
-        Raises:
-            InputError: a column of J belongs to several joints of the target program, because one joint
-                mimics the other joint.
+        angles. If a column of J belongs to several joints of the target program, because one mimics the
+        other, InputError is raised.
 
         >>> import urdfkin
         >>> a1 = urdfkin.load("a1", verify=False)
@@ -715,17 +677,13 @@ class Conversion:
     def from_jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
         """Convert the target program's Jacobian J (..., 6, program's nv) to urdfkin's (..., 6, nv): S J M.
 
-        M is `matrix`. S exchanges the linear and the angular rows if the target program has the angular rows
-        first. The column of a mimic joint is added to the mimicked joint's column.
+        The column of a mimic joint is added to the mimicked joint's column.
         """
         array = self.six(J, -2)
         return array @ _for_frames(self.matrix(q), array.ndim)
 
     def jacobian_rate(self, q: Given, v: Given, J: ArrayLike, rate: ArrayLike) -> FloatArray:
-        """Convert the time derivative J' of a Jacobian J to the target program's: S (J' M^-1 + J (M^-1)').
-
-        M is `matrix`. S exchanges the linear and the angular rows if the program has angular rows first.
-        """
+        """Convert the time derivative J' of a Jacobian J: S (J' M^-1 + J (M^-1)')."""
         found = self.jacobian(q, rate)
         if not self._blocks:
             return found
@@ -758,15 +716,9 @@ class Conversion:
     ) -> FloatArray:
         """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
 
-        Args:
-            quantity: Name of the quantity.
-            ours: q, or q and v, or q, v and a, in urdfkin's convention.
-            result: The result (..., 6), (..., 6, nv) or (..., 6, nv, nv); a placement is returned unchanged.
-            jacobian: Function that returns the Jacobian (..., 6, nv). `result` calls this function only if it
-                converts a time derivative of the Jacobian or a Hessian.
-
-        Raises:
-            InputError: urdfkin's conventions do not define a conversion of this quantity.
+        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. A placement is returned unchanged.
+        The function `jacobian` is called only for a time derivative of the Jacobian or a Hessian. A quantity
+        whose conversion the conventions do not define raises InputError.
         """
         if quantity == "placement":
             return result
@@ -823,8 +775,8 @@ class Reordering:
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
     """Return the formula that converts "q" or "v" from convention `start` to convention `end`, or None.
 
-    There is no formula if one of the two conventions stores the cosine and the sine of an angle, or if the
-    two conventions express a base velocity in different frames.
+    There is no formula if one convention stores the cosine and the sine of an angle. There is also none if
+    the two conventions express a base velocity in different frames.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -860,8 +812,7 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
 
 
 def _times(B: FloatArray, x: FloatArray) -> FloatArray:
-    found: FloatArray = (B @ x[..., np.newaxis])[..., 0]
-    return found
+    return (B @ x[..., np.newaxis])[..., 0]
 
 
 def _inverse(B: FloatArray) -> FloatArray:

@@ -1,8 +1,7 @@
 """Find joints of two mechanisms that may correspond, and poses and zero offsets that align their axes.
 
-Joints at two matched bodies are paired in three ways: by the names that the user gives, by equal names, and
-by geometry. This module also proposes poses of a body, and zero offsets of a joint. `MechanismMatcher` tries
-each proposal.
+Joints at two matched bodies are paired by the names that the user gives, by equal names, or by geometry.
+`MechanismMatcher` tries each proposed pose and zero offset.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other. Each subtree begins after a joint. The angle of this joint does not matter, because it can be added
@@ -26,6 +25,7 @@ import numpy as np
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.mechanisms.mechanism import (
     ALONG,
+    IDENTITY,
     Edge,
     Mechanism,
     Screw,
@@ -43,10 +43,7 @@ Via = tuple[Edge | None, Edge | None]
 
 
 def family(kind: JointKind) -> str:
-    """Return a joint's kind of motion; revolute and continuous joints have the same kind.
-
-    Joints of different kinds are never paired.
-    """
+    """Return a joint's kind of motion; joints of different kinds are never paired."""
     return _FAMILIES[kind]
 
 
@@ -61,21 +58,16 @@ _FAMILIES = {
 
 
 class Pairing:
-    """For each pair of bodies, find the pairs of a joint of mechanism A and a joint of mechanism B.
+    """Find pairs of a joint of mechanism A and a joint of mechanism B, for each pair of bodies.
 
-    Args:
-        a: One mechanism.
-        b: The other mechanism.
-        given: Names of joints of `a`, each with the name of the corresponding joint of `b`.
-        tolerance: Tolerance for the comparison of joint axes.
+    `given` contains names of joints of `a`, each with the name of the corresponding joint of `b`.
     """
 
     def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
         self._named = {name for pair in given.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
-        #: Pairs of links with the same name. The dictionary stores each result, because it is needed for
-        #: thousands of poses.
+        #: Pairs of links with the same name. They are stored because thousands of poses need them.
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
             tuple[tuple[int, int], Via], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
@@ -95,15 +87,10 @@ class Pairing:
     def edges(
         self, bodies: tuple[int, int], via: Via, G: FloatArray, XC: FloatArray
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Pair the joints at a body of A with the joints at a body of B.
+        """Pair the joints at two bodies; return the joint pairs, and the unpaired joints of A and of B.
 
-        Return three lists: the joint pairs, the unpaired joints of A, and the unpaired joints of B.
-
-        Args:
-            bodies: The body of A and the body of B.
-            via: The joint of A and the joint of B before these bodies; None at the first bodies.
-            G: (4, 4) motion that moves A's zero configuration to the current pose of B.
-            XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
+        `via` contains the joints before these bodies; None at the first bodies. The motions G and XC (4, 4)
+        move the zero configurations of A and of B to the current pose of B.
         """
         named, left_a, left_b = self.by_names(bodies, via)
         pairs = list(named)
@@ -128,10 +115,7 @@ class Pairing:
     def by_names(
         self, bodies: tuple[int, int], via: Via
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the joint pairs found by name, and the joints that must be paired by geometry.
-
-        The second result contains such joints of A, and the third result contains such joints of B.
-        """
+        """Return the joint pairs found by name, and the joints of A and of B that geometry must pair."""
         if (known := self._by_names.get((bodies, via))) is None:
             known = self._by_names[bodies, via] = self._named_alike(bodies, via)
         return known
@@ -149,15 +133,11 @@ class Pairing:
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each joint axis at a body of A coincides with an axis of B.
-
-        The axes of B are first moved by the rigid motion X.
-        """
-        at = np.eye(4)
+        """Return whether each joint axis at a body of A coincides with an axis of B that is moved by X."""
         return all(
             any(
                 family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
-                and self._tolerance.holds(*self.mismatch(e, f, at, X))
+                and self._tolerance.holds(*self.mismatch(e, f, IDENTITY, X))
                 for f in self.b.edges_of[bodies[1]]
             )
             for e in self.a.edges_of[bodies[0]]
@@ -165,19 +145,12 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Sort joints of B by their similarity to a joint of A.
+        """Sort joints of B by their similarity to a joint of A; the most similar joint comes first.
 
-        Omit joints that the user matched with `--map`.
-
-        The most similar joint comes first.
-
-        Args:
-            bodies: The body of A and the body of B.
-            e: Joint of A.
-            edges: Joints of B.
-            X: (4, 4) rigid motion that moves B from its zero configuration to the pose of A.
+        Joints that the user matched with `--map` are omitted. The motion X (4, 4) moves B from its zero
+        configuration to the pose of A.
         """
-        one = self._geometries(self.a, bodies[0], [e], np.eye(4))
+        one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
         ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []
         return [edges[j] for _, j in ranked]
@@ -208,9 +181,9 @@ class Pairing:
     def _geometries(
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _JointGeometry]]:
-        """Return the index and the geometry of each joint, after the rigid motion T of the mechanism.
+        """Return the index and the geometry of each joint whose partner the user did not name.
 
-        Joints whose partner the user named are omitted.
+        The mechanism is first moved by the rigid motion T.
         """
         return [
             (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
@@ -259,11 +232,7 @@ class Pairing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _JointGeometry:
-    """The geometry of a joint.
-
-    The geometry consists of the joint's kind and axis, the shape of the subtree, and the origin and z axis of
-    the joint's frame.
-    """
+    """A joint's kind and axis, the shape of its subtree, and the origin and z axis of its frame."""
 
     kind: str
     shape: str
@@ -279,10 +248,7 @@ class _JointGeometry:
         return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
 
     def mismatch(self, other: _JointGeometry) -> tuple[float, float]:
-        """Return the angle (rad) and the distance (m) between this joint's axis and another's.
-
-        The two joints must be of the same kind.
-        """
+        """Return the angle (rad) and the distance (m) between the axes of two joints of the same kind."""
         if self.kind == "planar":
             normals = (Screw(one.normal, one.normal) for one in (self, other))
             return between_lines(*normals, placed=False)
@@ -291,13 +257,13 @@ class _JointGeometry:
 
 def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between the axes of two joints of the same kind."""
-    if kind == "floating":  # a floating joint reaches every pose, so any two agree
+    if kind == "floating":  # A floating joint reaches every pose, so any two agree.
         return 0.0, 0.0
     return between_lines(s, t, placed=kind == "turns")
 
 
 _Some = TypeVar("_Some")
-#: Two objects of the same type: one of mechanism A and one of mechanism B.
+#: One object belongs to mechanism A, the other to mechanism B.
 Both = tuple[_Some, _Some]
 
 
@@ -306,8 +272,7 @@ class Axis:
     """A joint's screw in the zero configuration.
 
     Attributes:
-        screw: The axis as a directed line; for a prismatic joint, only the direction of the line has a
-            meaning.
+        screw: The axis as a directed line; only its direction has a meaning for a prismatic joint.
         turns: Whether the joint is revolute.
         seen: A reference line, usually the axis of the joint before this joint.
     """
@@ -317,7 +282,6 @@ class Axis:
     seen: Screw
 
     def moved(self, T: FloatArray) -> Axis:
-        """Return the axis after a rigid motion T."""
         return Axis(self.screw.moved(T), self.turns, self.seen.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
@@ -394,11 +358,7 @@ def root_poses_by_siblings(
 ) -> Iterator[FloatArray]:
     """Yield poses of B's root. Each pose aligns up to three joint axes of two matching bodies.
 
-    Args:
-        a: One mechanism.
-        b: The other mechanism.
-        bodies: A body of A and a body of B. Both bodies have several joints.
-        alike: Function that returns whether a joint of A may be paired with a joint of B.
+    Both bodies have several joints. `alike` says whether a joint of A may be paired with a joint of B.
     """
     edges = _with_axes(a, bodies[0])
     ours = [_axis(a, edge) for edge in edges]
@@ -407,7 +367,8 @@ def root_poses_by_siblings(
         return
     first = turning[0]
     u = ours[first].screw
-    rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -_across(u, ours[i].screw))
+    sines = [float(np.linalg.norm(np.cross(u.direction, axis.screw.direction))) for axis in ours]
+    rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -sines[i])
     second, others = rest[0], [i for i in rest[1:] if ours[i].turns][:1]
     theirs = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
     for f, axis in theirs[first]:
@@ -422,7 +383,7 @@ def root_poses_by_siblings(
             more = [
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
-            if not ours[second].turns:  # a prismatic joint has no `height`
+            if not ours[second].turns:  # A prismatic joint has no `height`.
                 carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
@@ -442,11 +403,6 @@ def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
     return [edge for edge in mechanism.edges_of[body] if mechanism.joint(edge).kind.has_axis]
 
 
-def _across(u: Screw, s: Screw) -> float:
-    """Return the sine of the angle between the directions of two axes."""
-    return float(np.linalg.norm(np.cross(u.direction, s.direction)))
-
-
 def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
     return [x for ours, theirs in pairs for x in zeros(u, ours, theirs.moved(X), turns)] or [0.0]
 
@@ -454,10 +410,10 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _firsts(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Find the first revolute axes below two bodies.
+    """Find the first revolute axes below two bodies; if there is none, the prismatic axes.
 
     Each result is a triple: an axis pair (one axis of A and one of B), the axis pairs before it, and the axis
-    pairs after it. If there is no revolute axis, the function returns prismatic axes.
+    pairs after it.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -474,10 +430,7 @@ def _firsts(
 def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
-    """Yield all pairs of joints of the same kind at two bodies, one joint of A and one of B.
-
-    Joints without an axis are omitted.
-    """
+    """Yield all pairs of joints with axes and of the same kind at two bodies, one of A and one of B."""
     ours, theirs = (
         [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]
         for mechanism, by, body in zip(mechanisms, via, bodies, strict=True)
@@ -492,47 +445,31 @@ def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
     return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)
 
 
-#: A function that proposes poses of the child body of B's joint, for a pair of matched joints. Its arguments
-#: are the two child bodies, the two joints, and the pose of the parent body in B.
+#: Proposes poses of the child body of B's joint, for a pair of matched joints.
+#: The arguments are the two child bodies, the two joints, and the pose of the parent body in B.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Largest number of joints on a path for the search for exact matches, which is recursive. A mechanism with a
-#: longer path is matched without this search.
+#: The recursive search for exact matches allows this number of joints on a path.
+#: A mechanism with a longer path is matched without this search.
 DEEPEST = 200
-#: Largest number of joint pairs that the search for exact matches tries at two bodies.
+#: The search for exact matches tries at most this number of joint pairs at two bodies.
 MOST_ASSIGNMENTS = 5000
 
-IDENTITY = np.eye(4)
-
-#: For each coordinate of A, the name of the corresponding coordinate of B, and the ratio of their velocities
-#: (B's velocity divided by A's velocity). The ratio is negative if one coordinate increases while the other
-#: decreases.
+#: Each coordinate of A has the name of B's corresponding coordinate, and the ratio of their velocities.
+#: The ratio is B's velocity divided by A's; a negative ratio means opposite directions.
 Rates = Mapping[str, tuple[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """The result of matching the subtrees below two joints.
-
-    Attributes:
-        X: (4, 4) pose of B's body after the joint.
-        rates: The corresponding coordinates of A and B in these subtrees.
-    """
+    """The matched subtrees below two joints: the pose X (4, 4) of B's body, and the subtrees' coordinates."""
 
     X: FloatArray
     rates: Rates
 
 
 class Congruence:
-    """Exact matches between subtrees of mechanism A and subtrees of mechanism B.
-
-    Args:
-        a: One mechanism.
-        b: The other mechanism.
-        pairing: Joints and links paired by name.
-        tolerance: Tolerance for the comparison of joint axes.
-        poses: Returns candidate poses of B's body after a joint.
-    """
+    """Exact matches between subtrees of mechanism A and subtrees of mechanism B."""
 
     def __init__(
         self, a: Mechanism, b: Mechanism, pairing: Pairing, tolerance: Tolerance, poses: Poses
@@ -550,10 +487,8 @@ class Congruence:
     def at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
         """Return the joint pairs at two bodies if the subtrees after these bodies match exactly, else None.
 
-        Args:
-            bodies: The body of A and the body of B.
-            via: The joint of A and the joint of B before these bodies; None at the first bodies.
-            X: (4, 4) motion of B's body from B's zero configuration to the pose of A's body.
+        `via` contains the joints before these bodies; None at the first bodies. The motion X (4, 4) moves B's
+        body from B's zero configuration to the pose of A's body.
         """
         found = None if self._off else self._at(bodies, via, X)
         return None if found is None else found[0]
@@ -561,11 +496,7 @@ class Congruence:
     def behind(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
         """Return the pose (4, 4) of B's body after two joints if the subtrees match exactly, else None.
 
-        Args:
-            e: Joint of A.
-            f: Joint of B.
-            bodies: The bodies before the joints.
-            X: (4, 4) pose of the parent body of B's joint, as in the method `at`.
+        X is the pose of the parent body of B's joint, as in the method `at`.
         """
         found = None if self._off else self._behind(e, f, bodies, X)
         return None if found is None else found.X
@@ -596,10 +527,7 @@ class Congruence:
         tries: list[int],
         rates: Rates,
     ) -> tuple[Sequence[Pair], Rates] | None:
-        """Pair each joint of A with a different joint of B, so that all subtrees match exactly.
-
-        If this is impossible, the result is None.
-        """
+        """Pair each joint of A with a different joint of B, so that all subtrees match exactly; else None."""
         if not left:
             return [], rates
         at = min(range(len(left)), key=lambda i: len(candidates[i]))
@@ -635,10 +563,7 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """Return the corresponding coordinates of A and B for two matched joints.
-
-        The result is empty if one of the two joints has no coordinate.
-        """
+        """Return the corresponding coordinates of two matched joints; empty if one has no coordinate."""
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
             return {}
@@ -687,7 +612,6 @@ class Congruence:
 
 
 def _distinct(poses: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Yield the poses without exact duplicates."""
     seen = set[bytes]()
     for X in poses:
         if (key := X.tobytes()) not in seen:

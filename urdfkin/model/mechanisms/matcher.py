@@ -1,13 +1,9 @@
-"""Align mechanism B with mechanism A.
-
-An alignment pairs the joints of A with those of B. It also contains the body of B that corresponds to A's
-first body, the order of B's joints, and the sign and the zero offset of each joint. The code calls this sign
-the `sense` of the joint.
+"""Align mechanism B with mechanism A: pair their joints, and find the sign and zero offset of each joint.
 
 `MechanismMatcher` starts at a body of A and the corresponding body of B. From these bodies it goes through
-both trees, joint by joint. At each joint it chooses the sign and the zero offset for which most later links
-and axes of B coincide with links and axes of A. `align` calls the matcher for several first bodies and joint
-orders, and returns the best result.
+both trees, joint by joint. At each joint it chooses a sign (`sense`) and a zero offset. With this
+choice, most later links and axes of B coincide with those of A. `align` calls the matcher for several first
+bodies and joint orders, and returns the best result.
 
 In most cases, the axes and link frames below a joint determine its zero offset. If no axes and no link frames
 are below the joint, only a mimic rule can determine the offset. Let v = m w + c be a mimic rule of A, and let
@@ -58,28 +54,24 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
-#: Number of further joints that the matcher compares if the next axis agrees equally well for two choices.
+#: The matcher compares this number of further joints if two choices agree equally well.
 AHEAD = 6
-#: Largest number of poses of B's root that the search for an exact match tries. In each of these poses, the
-#: axes at a body of B coincide with axes at a body of A.
+#: The search for an exact match tries at most this number of poses of B's root.
+#: In each of these poses, the axes at a body of B coincide with axes at a body of A.
 MOST_ROOT_POSES = 48
-#: Suppose that equally many links and axes agree for two choices. One choice is better only if its largest
-#: difference is less than this fraction of the other's largest difference.
+#: Suppose that equally many links and axes agree for two choices.
+#: One choice is better if its largest difference is less than this fraction of the other's.
 TWICE_AS_WELL = 0.5
 
-#: The result that the matcher chooses for a joint: a zero offset (rad or m), or a pose for a planar or
-#: floating joint.
+#: The result for a joint is a zero offset (rad or m); for a planar or floating joint, it is a pose.
 _Free = TypeVar("_Free", float, FloatArray)
-#: The number of links and axes of A that agree with B, and the largest difference (m).
+#: A score is the number of links and axes of A that agree with B, and the largest difference (m).
 Score = tuple[int, float]
 
 
 @dataclass(slots=True)
 class Ahead:
-    """The number of joint pairs ahead of the current joint that may still be compared.
-
-    Several matchers may share this object.
-    """
+    """The number of joint pairs ahead that several matchers together may still compare."""
 
     left: int
 
@@ -89,7 +81,6 @@ class Place:
     """A body of A, the corresponding body of B, and the poses that the matcher has found for them.
 
     Attributes:
-        bodies: Index of the body of A, and index of the body of B.
         via: The joint of A and the joint of B before these bodies; None at the base.
         previous: Index of the step (joint pair) before these bodies; -1 at the base.
         G: (4, 4) motion that moves A's zero configuration to the current pose of B.
@@ -135,7 +126,7 @@ class MechanismMatcher:
         self.counts = _counts(a), _counts(b)
         #: The number of joints and links that agree in the best alignment so far.
         self.matched = 0
-        #: The search for exactly matching subtrees; None if the argument `gauge` prescribes the alignment.
+        #: It searches for exactly matching subtrees; None means that `gauge` prescribes the alignment.
         self.exact = Congruence(a, b, pairing, tolerance, self._poses_behind) if gauge is None else None
 
     # -- where to begin ------------------------------------------------------------------------------
@@ -160,14 +151,17 @@ class MechanismMatcher:
         """
         if self.gauge is not None:
             names = self.gauge.base
-            base = next(self._bases()) if names is None else self._bodies_of(*names)
+            base = next(self._bases())
+            if names is not None:
+                links = self.a.tree.link_index(names[0]), self.b.tree.link_index(names[1])
+                base = self.a.body_of[links[0]], self.b.body_of[links[1]]
             X = self.gauge.X
             yield base, IDENTITY if self.tolerance.holds(*apart(IDENTITY, X)) else X
             return
         bases = list(self._bases())
         if self.exact is not None:
             exact = self._exact_beginning(bases)
-            if exact is None and self._mimics():
+            if exact is None and any(joint.mimic for m in (self.a, self.b) for joint in m.tree.joints):
                 self.exact.ignore_rules()
                 exact = self._exact_beginning(bases)
             if exact is not None:
@@ -189,7 +183,7 @@ class MechanismMatcher:
         the branches are matched in the order of their sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
-        for k in (0, 1):  # joints, links
+        for k in (0, 1):  # The counts of joints and of links.
             sizes = (
                 sorted(
                     (
@@ -202,9 +196,6 @@ class MechanismMatcher:
             )
             most += sum(map(min, *sizes))
         return most
-
-    def _mimics(self) -> bool:
-        return any(joint.mimic is not None for m in (self.a, self.b) for joint in m.tree.joints)
 
     def _exact_beginning(self, bases: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], FloatArray] | None:
         """Return two bodies and a pose of B's root for which all of A matches all of B exactly, or None."""
@@ -227,11 +218,7 @@ class MechanismMatcher:
         yield from islice(some, MOST_ROOT_POSES)
 
     def _places(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield poses of B's root that the matcher tries.
-
-        First comes the pose of A's root. Then come poses for which two links with equal names coincide, and
-        last those for which two axes coincide.
-        """
+        """Yield poses of B's root: that of A's root, then by links with equal names, then by axes."""
         yield from self._by_names(base)
         yield from self._by_axes(base)
 
@@ -240,10 +227,6 @@ class MechanismMatcher:
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
-
-    def _bodies_of(self, link_a: str, link_b: str) -> tuple[int, int]:
-        a, b = self.a, self.b
-        return a.body_of[a.tree.link_index(link_a)], b.body_of[b.tree.link_index(link_b)]
 
     def _bases(self) -> Iterator[tuple[int, int]]:
         """Yield pairs of bodies (one of A and one of B) at which the matcher may start.
@@ -298,21 +281,16 @@ class MechanismMatcher:
         return found
 
     def _edges(self, place: Place) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the pairs of the next joints, the unpaired joints of A, and the unpaired joints of B."""
         pairs = self._exact_pairs(place.bodies, place.via, inverse(place.G) @ place.XC)
         if pairs is not None:
             return pairs, (), ()
         return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
 
     def _exact_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        """Return the joint pairs at two bodies if the subtrees after the bodies match exactly, else None."""
         return None if self.exact is None else self.exact.at(bodies, via, X)
 
     def _poses_behind(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield poses of the body of B after a joint, for the pose X of the body before it.
-
-        The two matched joints are of the same kind.
-        """
+        """Yield poses of the body of B after a joint, for the pose X of the body before it."""
         there = Place(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
@@ -343,7 +321,7 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
 
     def _as_tools(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
-        """Return a pair of links, one of each body, that can be different end-effector frames; or None.
+        """Return two links, one of each body, that can be different end-effector frames; or None.
 
         The result is None if links of the two bodies match, or if a body has no link of its own.
         """
@@ -407,10 +385,7 @@ class MechanismMatcher:
     def _free(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, kind: str
     ) -> tuple[Step, Place, Score]:
-        """Match two planar or two floating joints.
-
-        Their frames and the zeros of their coordinates may differ.
-        """
+        """Match two planar or two floating joints, whose frames and zeros may differ."""
         e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
         at, seen = place.G @ homes[0], place.XC @ homes[1]
@@ -438,8 +413,8 @@ class MechanismMatcher:
             tried = self._behind(there, at, homes[1], plane, self._by_axes(there.bodies))
         places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
         N, moved, score = self._best(places, depth)
-        # Let P_a and P_b be the joint's poses in A and B. If the path leads from the joint's child to its
-        # parent, they are the inverse poses. Then P_b = M P_a N.
+        # Let P_a and P_b be the joint's poses in A and B, so P_b = M P_a N.
+        # If the path leads from the joint's child to its parent, P_a and P_b are the inverse poses.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
         before, behind = (IDENTITY if self.tolerance.holds(*apart(IDENTITY, T)) else T for T in pair)
         if before is IDENTITY and behind is IDENTITY and not back:
@@ -497,12 +472,12 @@ class MechanismMatcher:
         if self.tolerance.holds(tilt, shift):
             exact = self._exact_pose(place, there)
             if exact is not None:
-                zero = _value_of(t, inverse(place.XC) @ exact, turns=turns)
+                T = inverse(place.XC) @ exact
+                zero = turn_about(t.direction, T[:3, :3]) if turns else float(t.direction @ T[:3, 3])
                 zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
-        # Either the joint and all bodies after it have another pose in B than in A, or only the joint's axis
-        # differs.
+        # Either the joint and all bodies after it have another pose in B, or only the joint's axis differs.
         with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
@@ -529,10 +504,7 @@ class MechanismMatcher:
     def _best_zero(
         self, there: Place, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
     ) -> tuple[float, Place, Score]:
-        """Return the zero offset of B's joint for which most links and axes below the joint agree.
-
-        Offset 0 is tried first.
-        """
+        """Return the zero offset of B's joint for which most links and axes agree; 0 is tried first."""
         offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
         moved = (
             (offset, there.XC @ along(t, offset, turns=turns) if offset else there.XC) for offset in offsets
@@ -552,7 +524,7 @@ class MechanismMatcher:
                 continue
             score = self._score(place)
             scored.append((what, place, score))
-            if not score[1] and self.pairing.links(*place.bodies):  # no other choice can agree better
+            if not score[1] and self.pairing.links(*place.bodies):  # No other choice can agree better.
                 return scored[-1]
         best = _best_of(scored)
         equal = [one for one in scored if not better(best[2], one[2])]
@@ -603,24 +575,20 @@ def _counts(mechanism: Mechanism) -> list[tuple[int, int]]:
     The root body has no joint before it, but is counted as if it had one.
     """
     found = [(1, len(links)) for links in mechanism.bodies]
-    for edge in reversed(mechanism.edges):  # from the tips to the root
+    for edge in reversed(mechanism.edges):  # The edges go from the root to the tips.
         joints, links = found[edge.outer]
         found[edge.inner] = found[edge.inner][0] + joints, found[edge.inner][1] + links
     return found
 
 
 def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
-    """Return the body of `other` that has most link names in common with the root body of `one`.
-
-    Return None if no body of `other` has such a name.
-    """
+    """Return the body of `other` with most link names in common with the root body of `one`, or None."""
     names = {one.labels[link] for link in one.bodies[0]}
     shared = [len(names & {other.labels[k] for k in body}) for body in other.bodies]
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
 
 
 def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place, Score]:
-    """Return the element with the best score; `better` compares the scores."""
     best = scored[0]
     for one in scored[1:]:
         best = one if better(one[2], best[2]) else best
@@ -636,18 +604,8 @@ def better(score: Score, than: Score) -> bool:
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
-def _value_of(screw: Screw, T: FloatArray, *, turns: bool) -> float:
-    """Return the joint value (rad or m) for which the motion about this screw is the rigid motion T."""
-    if turns:
-        return turn_about(screw.direction, T[:3, :3])
-    return float(screw.direction @ T[:3, 3])
-
-
 def _outwards(screw: Screw, backwards: bool) -> Screw:
-    """Return a joint's screw with the sign that describes the motion of the body farther from the base.
-
-    If the path goes through the joint from child to parent, the screw is reversed.
-    """
+    """Return a screw whose sign describes the motion of the body farther from the base."""
     return screw.reversed() if backwards else screw
 
 
@@ -675,28 +633,24 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
     return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
 
 
-#: Largest number of joint orders that are tried. For example, five prismatic joints have 120 possible orders.
+#: At most this number of joint orders is tried; five prismatic joints have 120 possible orders.
 MOST_ORDERS = 120
-#: Largest number of joint pairs that one search compares ahead of the current joint. This takes some seconds.
+#: One search compares at most this number of joint pairs ahead of the current joint, in some seconds.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
 MOST_AHEAD = 2000
-#: Larger tolerances that are tried if A and B differ: for angles in rad, and for distances divided by the
-#: robot's size.
+#: Larger tolerances that are tried if A and B differ: rad, and distances divided by the robot's size.
 NEARLY = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: Largest number of joint-pair exchanges that are tried: (a, d) and (c, b) instead of (a, b) and (c, d). Only
-#: joints with different names are exchanged.
+#: At most this number of exchanges is tried: (a, d) and (c, b) instead of the pairs (a, b) and (c, d).
+#: Only joints with different names are exchanged.
 MOST_EXCHANGED = 12
 
 
 def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | None = None) -> Alignment:
     """Align B with A.
 
-    Args:
-        a: One mechanism.
-        b: The other mechanism.
-        given: Names of joints of A, each with the name of the matched joint in B.
-        gauge: Prescribed choices, for example zero offsets. If this is None, the function finds the choices
-            for which most joints and links agree.
+    `given` contains names of joints of A, each with the name of the matched joint in B. `gauge` prescribes
+    choices, for example zero offsets; without it, the function finds the choices for which most joints and
+    links agree.
     """
     if gauge is not None:
         for taken in gauge.orders:
@@ -722,14 +676,7 @@ def _orders_to_try(
     """Yield other orders of consecutive joints of B that give the same motion.
 
     If A has joints with all these names, the only two orders are the order in A and the reverse order.
-    Otherwise all orders are tried, up to `MOST_ORDERS`.
-
-    Args:
-        a: One mechanism.
-        b: The other mechanism.
-        given: Names of joints of A, each with the name of the matched joint in B.
-        run: Names of consecutive joints of B whose order does not matter, in the order from base to tip.
-        orders: All other orders of these joints that give the same motion.
+    Otherwise all `orders` are tried, up to `MOST_ORDERS`. `run` is the present order, from base to tip.
     """
     called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
@@ -756,7 +703,7 @@ def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
 
     The four joints are attached to the same body of A or B, and the joints of a pair have different names.
     """
-    if best.only_a or best.only_b:  # some joints have no partner, so no exchange can make A and B equal
+    if best.only_a or best.only_b:  # Some joints have no partner, so no exchange can make A and B equal.
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), Ahead(MOST_AHEAD)
     while (two := next((two for two in best.exchangeable(given) if two not in tried), None)) is not None:
@@ -812,11 +759,10 @@ def _best_alignment(
     return MechanismMatcher(a, b, pairing, gauge, ahead or Ahead(0), tolerance, base).best()
 
 
-#: Numbers of full turns that are tried as an addition to the zero offset of a revolute joint with a mimic
-#: rule.
+#: These full turns are added to the zero offset of a revolute joint with a mimic rule.
 TURNS = (0, 1, -1)
-#: The tolerance of a zero offset is the angle tolerance times this factor. The factor is large, because an
-#: offset computed from the positions of two close axes is inexact.
+#: The tolerance of a zero offset is the angle tolerance times this factor.
+#: The factor is large, because an offset computed from the positions of two close axes is inexact.
 LEVER = 1e4
 
 
@@ -896,10 +842,7 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
 
 
 def _groups(found: Alignment) -> Iterator[list[_Rule]]:
-    """Yield groups of steps.
-
-    All joints of a group depend on the same coordinate of A and the same coordinate of B.
-    """
+    """Yield groups of steps whose joints depend on the same coordinate of A and the same one of B."""
     groups = dict[tuple[str, str], list[_Rule]]()
     for i, step in enumerate(found.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):

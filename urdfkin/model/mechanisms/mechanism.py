@@ -94,7 +94,7 @@ def shortest_turn(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
     cross = np.cross(u, v)
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
-    if sine == 0.0:  # opposite vectors: any perpendicular axis is correct
+    if sine == 0.0:  # For opposite vectors, any perpendicular axis is correct.
         axis = np.zeros(3) if cosine > 0.0 else axis_aligning(u)[:, 0] * math.pi
         return exp_rotation(axis), angle
     return exp_rotation(cross * (angle / sine)), angle
@@ -102,7 +102,7 @@ def shortest_turn(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
 
 def apart(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between two poses."""
-    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # called thousands of times; plain floats are faster
+    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # Thousands of calls are faster with plain floats.
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
     return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
@@ -124,7 +124,7 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 
 #: Relative tolerance for the entries of a computed pose.
 NEARLY = 1e-9
-#: A pose (x, y, angle) of a planar joint for tests. None of the three coordinates (m, m, rad) is 0.
+#: Tests use this pose (x, y, angle) of a planar joint, in which no coordinate (m, m, rad) is 0.
 _AWAY = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
@@ -133,12 +133,8 @@ _Z = np.array([0.0, 0.0, 1.0])
 class JointTransform:
     """The conversion of a planar or floating joint: P_b = before P_a behind.
 
-    If `back` is true, the conversion is P_b = before P_a^-1 behind.
-
-    Attributes:
-        before: (4, 4) M.
-        behind: (4, 4) N.
-        back: Whether one model's joint is reversed.
+    `before` is M and `behind` is N, both (4, 4). If one model's joint is reversed (`back`), the conversion is
+    P_b = before P_a^-1 behind.
     """
 
     before: FloatArray
@@ -220,30 +216,21 @@ class Screw:
     point: FloatArray
 
     def moved(self, T: FloatArray) -> Screw:
-        """Return the screw after a rigid motion."""
         return Screw(T[:3, :3] @ self.direction, T[:3, :3] @ self.point + T[:3, 3])
 
     def reversed(self) -> Screw:
-        """Return the same line with the opposite direction."""
         return Screw(-self.direction, self.point)
 
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A joint between two bodies.
-
-    Attributes:
-        joint: Index of the joint in the tree.
-        inner: The parent body.
-        outer: The child body.
-    """
+    """A joint (index in the tree) between the parent body `inner` and the child body `outer`."""
 
     joint: int
     inner: int
     outer: int
 
     def beyond(self, body: int) -> int:
-        """Return the other body of the joint."""
         return self.outer if body == self.inner else self.inner
 
 
@@ -252,10 +239,10 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        parting: Indices of joints that are fixed in this model and move in the other model. The link before
-            such a fixed joint and the link after it belong to different bodies.
-        labels: The name of each link, by which links of the two models are paired. If this is None, links
-            have the names in the tree.
+        parting: Indices of joints that are fixed in this model and move in the other model. The links before
+            and after such a joint belong to different bodies.
+        labels: The name of each link, by which links of the two models are paired; by default its name in the
+            tree.
     """
 
     def __init__(
@@ -280,12 +267,11 @@ class Mechanism:
         self.bodies = bodies
         #: Each entry lists consecutive joints that `in_order` put in another order, in this new order.
         self.orders: tuple[tuple[str, ...], ...] = ()
-        #: For each link: length (m) of the path from the root to the link, and number of joints on it.
+        #: Each link has the length (m) of the path from the root and the number of joints on it.
         self.lengths, self.depths = lengths, depths
         self._screws: dict[int, Screw] = {}
 
     def joint(self, edge: Edge) -> Joint:
-        """Return the tree's `Joint` for an `Edge` (a joint between two bodies)."""
         return self.tree.joints[edge.joint]
 
     def screw(self, edge: Edge) -> Screw:
@@ -296,12 +282,9 @@ class Mechanism:
         return known
 
     def in_order(self, names: Sequence[str]) -> Mechanism:
-        """Return a mechanism with some consecutive joints in another order. The motion stays the same.
+        """Return a mechanism with consecutive joints in another order, from the inner body outwards.
 
-        The result does not contain the links between these joints.
-
-        Args:
-            names: Names of consecutive joints in their new order, from the inner body outwards.
+        The motion stays the same. The result does not contain the links between these joints.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -335,7 +318,7 @@ class Mechanism:
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
         """For each sequence of joints without a branch, yield all joint orders that give the same motion."""
         run: list[Edge] = []
-        for edge in self.edges:  # depth first; a run of joints ends where a body has several child joints
+        for edge in self.edges:  # Depth first; a run of joints ends where a body has several child joints.
             if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
                 run.append(edge)
                 continue
@@ -344,9 +327,9 @@ class Mechanism:
         yield self._orders(run, tolerance)
 
     def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
-        """Yield all orders of the joints of `run` that give the same motion.
+        """Yield all orders of the joints of `run` that give the same motion; the given order comes first.
 
-        Neighbours are exchanged if they commute. The given order comes first.
+        Neighbours are exchanged if they commute.
         """
         if not run:
             yield []
@@ -401,7 +384,6 @@ class Tolerance:
     way: float
 
     def holds(self, angle: float, way: float) -> bool:
-        """Return whether an angle (rad) and a distance (m) are within the tolerance."""
         return angle <= self.angle and way <= self.way
 
 
@@ -417,11 +399,8 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) of two axes.
-
-    If `placed` is false, only the axes' directions matter, and the distance is 0.
-    """
-    ux, uy, uz = s.direction.tolist()  # called thousands of times; plain floats are faster
+    """Return the angle (rad) and the distance (m) of two axes; the distance is 0 if `placed` is false."""
+    ux, uy, uz = s.direction.tolist()  # Thousands of calls are faster with plain floats.
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))
@@ -477,7 +456,6 @@ class Step:
 
     @property
     def differs(self) -> bool:
-        """Whether the axes of the two joints differ."""
         return self.tilt > 0.0 or self.shift > 0.0
 
 
@@ -491,7 +469,7 @@ class FramePair:
         previous: Index of the last step on the path to the links; -1 if no joint moves the links.
         home: (4, 4) pose of A's link in the zero configuration.
         end: (4, 4) the rigid motion L that is inserted after the last joint, in A's zero configuration.
-        tilt: Angle (rad) between the frame of A's link and the frame of B's link.
+        tilt: Angle (rad) between the frames of the two links.
         shift: Distance (m) between the origins of these two frames.
         tool: (4, 4) pose of B's link in the frame of A's link, if the two links are two different
             end-effector frames on the same body. Otherwise the identity.
@@ -513,7 +491,6 @@ class FramePair:
 
     @property
     def differs(self) -> bool:
-        """Whether the link frame has different poses on its body in A and in B."""
         return self.tilt > 0.0 or self.shift > 0.0
 
 
@@ -526,8 +503,7 @@ class Alignment:
         b: The other mechanism.
         base: The link of A and the link of B at which the search for matching joints started.
         X: (4, 4) pose of B's root in A's root frame.
-        steps: The joint pairs, ordered outwards from the base: a pair comes after all pairs between it and
-            the base.
+        steps: The joint pairs, ordered outwards from the base.
         frames: The pairs of matched links.
         only_a: Indices of the joints that only A has.
         only_b: Indices of the joints that only B has.
@@ -562,7 +538,6 @@ class Alignment:
 
     @property
     def size(self) -> float:
-        """The robot's size: the length (m) by which angles are multiplied to compare them with distances."""
         return size_of(self.a, self.b)
 
     @property
@@ -619,8 +594,7 @@ class Alignment:
         for a, b in pairs:
             if (known := on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # Two links on these bodies are already matched, which gives the transform from B's body to A's
-            # body in the zero configuration.
+            # A matched pair of links on these bodies gives the transform from B's body to A's.
             T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
             home, at = self.a.homes[a], T_a_b @ self.b.homes[b]
             tilt, shift = apart(home, at)
@@ -640,7 +614,6 @@ class Alignment:
         return found[::-1]
 
     def path(self, previous: int) -> list[Step]:
-        """Return the steps from the base to the step `previous`, including that step."""
         return [self.steps[i] for i in self.indices(previous)]
 
     @property
@@ -657,10 +630,8 @@ class Gauge:
         base: A link of A and a link of B. The search for matching joints starts at the bodies of these two
             links. If `base` is None, the search chooses its first bodies by link names.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: (`sense`, `offset`) of `Step`, by the joint's name in A. A joint that is not listed has the
-            values (1, 0.0).
-        conversions: For each planar or floating joint whose coordinates in A and B differ: the conversion
-            from A's coordinates to B's coordinates.
+        zeros: (`sense`, `offset`) of `Step`, by the joint's name in A; a missing joint has (1, 0.0).
+        conversions: Converts A's coordinates of a planar or floating joint to B's if they differ.
         orders: Each entry lists some consecutive joints of B in their new order.
     """
 
@@ -694,10 +665,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """The values of two matched joints, as functions of the variables.
-
-    Both values have the positive direction and the zero of A's joint.
-    """
+    """The values of two matched joints, with the positive direction and the zero of A's joint."""
 
     a: Line
     b: Line
@@ -762,7 +730,7 @@ class _Maker:
     def __init__(self, found: Alignment, tolerance: Tolerance) -> None:
         self.found, self.tolerance = found, tolerance
         self.trees = found.a.tree, found.b.tree
-        self.step_of_b = {step.b: i for i, step in enumerate(found.steps)}
+        self.step_of_b = {step.b: step for step in found.steps}
         self.leaders = self._leaders()
         self.deepest = found.deepest
 
@@ -777,7 +745,7 @@ class _Maker:
         for i in followers_last:
             name = tree.joints[i].name
             lines[name] = Line(f"b:{name}", 1.0, 0.0)
-            step = self._step(i)
+            step = self.step_of_b.get(i)
             if step is None or step.unlike:
                 continue
             value = self._a(step)
@@ -786,12 +754,8 @@ class _Maker:
                 lines[name] = value.moved(step.sense, step.offset)
         return lines
 
-    def _step(self, joint_b: int) -> Step | None:
-        at = self.step_of_b.get(joint_b)
-        return None if at is None else self.found.steps[at]
-
     def _follows_in_a(self, joint_b: int) -> bool:
-        step = self._step(joint_b)
+        step = self.step_of_b.get(joint_b)
         return step is not None and self.trees[0].joints[step.a].mimic is not None
 
     def _a(self, step: Step) -> Line:
@@ -868,7 +832,7 @@ class _Maker:
         for step, pair in zip(self.found.steps, pairs, strict=True):
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
-                if pair is None:  # the two joints are of different kinds, and each has its own coordinate
+                if pair is None:  # The two joints are of different kinds, and each has its own coordinate.
                     if step.unlike and joint.nq == 1:
                         own[f"{'ab'[k]}:{joint.name}"] = limits(joint)
                     continue

@@ -51,8 +51,8 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.tree import FloatArray
 
 _WHOLE = 2.0 * math.pi
-#: Number of corners of a regular polygon that contains a circle. The polygon's corners are 0.1 % farther from
-#: the centre than the circle.
+#: A regular polygon with this number of corners contains a circle.
+#: The polygon's corners are 0.1 % farther from the centre than the circle.
 _AROUND = 64
 
 
@@ -70,10 +70,7 @@ class Grid:
 
     @property
     def points(self) -> FloatArray:
-        """The grid points (n, 3) on the cube's surface.
-
-        The largest absolute coordinate of each point is 1.
-        """
+        """The grid points (n, 3); the largest absolute coordinate of each point is 1."""
         return _points(self.cells)
 
     @property
@@ -99,19 +96,13 @@ def _points(cells: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Support:
-    """The support function (m) of a set of points, or an upper bound on it.
-
-    The attribute `values` contains the function's value at each grid point.
-    """
+    """The support function (m) of a set of points, or an upper bound; `values` are at the grid points."""
 
     grid: Grid
     values: FloatArray
 
     def at(self, u: FloatArray) -> FloatArray:
-        """Return upper bounds (...) on the support function h(u) for vectors u (..., 3).
-
-        The vectors may have any length; for the zero vector, the result is 0.
-        """
+        """Return upper bounds (...) on h(u) for vectors u (..., 3) of any length; 0 for the zero vector."""
         cells, v = self.grid.cells, self.values
         x, y, z = u[..., 0].ravel(), u[..., 1].ravel(), u[..., 2].ravel()
         X, Y, Z = np.abs(x), np.abs(y), np.abs(z)
@@ -133,7 +124,7 @@ class Support:
             near = v[at] + up * (v[at + 1] - v[at])
             far = v[at + cells + 1] + up * (v[at + cells + 2] - v[at + cells + 1])
             found = (near + right * (far - near)) * largest
-        found[np.isnan(found)] = np.inf  # zero times infinity is NaN; the bound is then infinite
+        found[np.isnan(found)] = np.inf  # Zero times infinity is NaN; the bound is then infinite.
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def turned(self, screw: Screw, low: float, high: float) -> Support:
@@ -148,24 +139,17 @@ class Support:
         """Return the support function's values (angles, n) at the n grid points after rotations of the set.
 
         The set rotates about `axis` by each of `angles` (rad). Since h'(u) is h(R^T u), the method rotates
-        the grid points by the opposite angle.
-
-        The component of a grid point perpendicular to the axis is multiplied by the angle's number in
-        `factors`.
+        the grid points by the opposite angle. The component of a grid point perpendicular to the axis is
+        multiplied by the angle's number in `factors`.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
-        back = rotation_about(axis, angles)  # row vector times R equals R^T times the column vector
+        back = rotation_about(axis, angles)  # A row vector times R equals R^T times the column vector.
         across = (G - along) @ back * np.reshape(factors, (-1, 1, 1))
         return self.at(along + across)
 
     def slid(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Translate the set along a direction by all distances of a range.
-
-        Return the support function of the union.
-
-        The set is translated by every distance (m) from `low` to `high`.
-        """
+        """Translate the set by all distances (m) of a range. Return the support function of the union."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             ways = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
@@ -202,7 +186,6 @@ class Support:
 
 
 def point(grid: Grid, p: FloatArray) -> Support:
-    """Return the support function of a single point p."""
     return Support(grid, grid.points @ p)
 
 
@@ -224,8 +207,8 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 
 #: `COARSE` is for the bounds of many frames; `FINE` gives a smaller bound, but takes longer.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
-#: Largest number of sample values of a revolute joint's variable. If the variable's range needs more, the
-#: joint's angles in A and B are treated as independent.
+#: A revolute joint's variable has at most this number of sample values.
+#: If the range needs more, the joint's angles in A and B are treated as independent.
 MOST_VALUES = 1024
 
 
@@ -234,10 +217,9 @@ def upper_bounds(
 ) -> tuple[float, float]:
     """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
 
-    The bounds hold for all joint values within the limits.
-
-    The bounds are 0 if nothing differs on the path. The bounds are inf if the difference grows without bound
-    with the value of an unlimited joint, or if two matched joints are of different kinds.
+    The bounds hold for all joint values within the limits. The bounds are 0 if nothing differs on the path.
+    They are inf if the difference grows without bound with the value of an unlimited joint, or if two matched
+    joints are of different kinds.
     """
     steps, pairs = behind_first(found, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -245,7 +227,7 @@ def upper_bounds(
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
     radians = _radians(steps, pairs, variables, frame)
-    if not steps:  # no joint differs, so the distance is the same in every configuration
+    if not steps:  # No joint differs, so the distance is the same in every configuration.
         d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
         return float(np.linalg.norm(d)), radians
     return _metres(steps, pairs, variables, frame, grid), radians
@@ -279,8 +261,8 @@ def _radians(
         if step.kind != "turns" or pair is None:
             continue
         if step.other is not step.axis:
-            # Let R be the joint's rotation by an angle t, and Q the rotation by the tilt s between the two
-            # axes. For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
+            # Let R be the joint's rotation by t, and Q the rotation by the tilt s between the axes.
+            # For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
             total += 4.0 * math.asin(math.sin(step.tilt / 2.0) * math.sin(most / 2.0))
         if pair.a != pair.b:
@@ -383,7 +365,7 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
     """
     if (name := pair.variable) is None:
         return None
-    low, high = variables.ranges.get(name, (0.0, 0.0))  # the joints in A and B do not move
+    low, high = variables.ranges.get(name, (0.0, 0.0))  # Without a range, the joints in A and B do not move.
     fastest = max(abs(pair.a.slope), abs(pair.b.slope))
     if math.isinf(high - low):
         if {abs(pair.a.slope), abs(pair.b.slope)} - {0.0, 1.0}:
