@@ -27,11 +27,11 @@ from urdfkin.verify.adapters import LIBRARIES, version
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Two poses count as equal if they differ by at most this number. If positions are larger than 1 m, the
-#: number is multiplied by the largest position in metres. Libraries that compute in double precision differ
-#: by less than 1e-13. A misread element causes a larger difference.
+#: Poses count as equal if their entries differ by at most `_EQUAL` * max(1, largest entry).
+#: Libraries that compute in double precision differ by less than 1e-13.
+#: A misread element causes a larger difference.
 _EQUAL = 1e-9
-#: For libraries that compute in single precision: largest difference between two poses that count as equal.
+#: The same number for libraries that compute in single precision.
 _EQUAL_SINGLE = 1e-5
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
@@ -95,20 +95,16 @@ class LibraryReading:
 
 
 def installed(form: str = "urdf") -> tuple[str, ...]:
-    """Return the names of the libraries of this environment that have an adapter for a format."""
+    """Return the names of the installed libraries that have an adapter for a format."""
     return tuple(name for name, one in LIBRARIES.items() if form in one.forms and version(name) is not None)
 
 
 def compare_readers(
     robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
 ) -> tuple[LibraryReading, ...]:
-    """Compare how libraries read a robot's file with how urdfkin reads it.
+    """Compare how libraries read a robot's file with how urdfkin reads it, by default all `installed` ones.
 
-    Args:
-        robot: The robot. The poses of all links are compared at q = 0 and at random configurations.
-        libraries: Names of libraries (`installed`); by default all installed libraries that read the format.
-        samples: Number of random configurations.
-        seed: Seed of the configurations.
+    The poses of all links are compared at q = 0 and at random configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
@@ -159,7 +155,7 @@ def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _reading(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Run one library in a separate process, and return how the library reads the robot."""
+    """Run one library in a separate process, and compare its poses with `ours` at `q`."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].forms:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
@@ -180,8 +176,7 @@ def _reading(
     if not shared:
         return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
     both = np.array([[one[links[i]] for i in shared] for one in theirs])
-    # The text does not contain a root joint that `load` added, so poses are compared relative to the first
-    # link that urdfkin and the library have.
+    # The text lacks a root joint that `load` added, so poses are relative to the first common link.
     both = np.linalg.inv(both[:, :1]) @ both
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(both - ours[:, shared]).max())
@@ -249,7 +244,7 @@ def _differences(
     own: Sequence[str],
     equal: float,
 ) -> Iterator[Difference]:
-    """Yield the joints whose child link has a different pose in the parent link."""
+    """Yield the joints with another pose of the child link in the parent link."""
     for i, joint in enumerate(robot.tree.joints, 1):
         if i not in theirs or joint.parent not in theirs:
             continue
@@ -266,8 +261,7 @@ def _explained(
 ) -> tuple[str, str]:
     """Return the element that explains a difference, and the difference in words.
 
-    `T` contains urdfkin's poses of the child link in the parent link, and `found` the library's. The first
-    pose is the pose at q = 0.
+    `T` (urdfkin) and `found` (library) are poses of the child link in the parent link, first at q = 0.
     """
     off = np.abs(T - found)
     name, words = f"type {joint.kind.value}", "has no coordinate for it"
@@ -288,7 +282,7 @@ def _explained(
 
 
 def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str:
-    """Describe how a joint's motion from q = 0 differs between urdfkin and the library."""
+    """Return words for the difference between urdfkin's and the library's motion from q = 0."""
     start = np.linalg.inv(T[0])
     mine, theirs = start @ T[1:], start @ found[1:]
     if joint.kind is JointKind.PRISMATIC:
