@@ -29,9 +29,7 @@ class CampaignProgress:
 
     Attributes:
         robots_done: Number of robots that are complete or failed.
-        robots: Number of robots.
         chunks_done: Number of chunks that are finished or no longer needed.
-        chunks: Number of chunks.
         chunks_kept: Number of finished chunks from an earlier run.
         failures: Number of robots so far that disagree or could not be checked.
         label: Name of the current robot.
@@ -46,18 +44,14 @@ class CampaignProgress:
     label: str
 
 
-#: Function that is called with the progress after each chunk.
 Progress = Callable[[CampaignProgress], None]
 
 
 class ResultCollector:
     """The answers of a run, by robot and chunk.
 
-    Args:
-        subjects: The robots.
-        cut: The division of their samples into chunks.
-        parts: The range of chunks to run for each robot.
-        progress: Callback, called before the work and after each answer.
+    `parts` is the range of chunks to run for each robot. The callback `progress` is called before the work
+    and after each answer.
     """
 
     def __init__(
@@ -78,7 +72,7 @@ class ResultCollector:
             self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
 
     def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
-        """Add an answer.
+        """Add an answer, and report the progress.
 
         `kept` is True if an earlier run computed the answer. The chunks of earlier runs are counted
         separately.
@@ -94,7 +88,6 @@ class ResultCollector:
             self._progress(self.standing(self._subjects[task.robot].label))
 
     def standing(self, label: str = "") -> CampaignProgress:
-        """Return the progress so far; `label` is the name of the current robot."""
         return CampaignProgress(
             robots_done=self._robots_done,
             robots=sum(bool(robot.part) for robot in self._robots),
@@ -128,8 +121,6 @@ class ResultCollector:
 
 
 class _Robot:
-    """The answers for one robot."""
-
     def __init__(self, part: range) -> None:
         self.part = part
         self.failures: dict[int, Failure] = {}
@@ -172,8 +163,7 @@ class _Robot:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        # Leave out results of chunks after the failed chunk. Which of these chunks were computed depends on
-        # the speed of the workers.
+        # Results after the failed chunk are left out: their number depends on the speed of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._runs if run.start < last]
@@ -204,10 +194,7 @@ class _Robot:
 def _verdict(
     tallies: dict[Key, Tally], portrait: RobotSummary, failure: Failure | None, samples: int, wanted: int
 ) -> tuple[Verdict, list[str]]:
-    """Return the verdict on a robot and all reasons for it.
-
-    A disagreement takes precedence over every other verdict.
-    """
+    """Return the verdict on a robot and all reasons for it; a disagreement takes precedence."""
     disagreements = [*_outside(tallies), *portrait.disagreements]
     verdict, reasons = Verdict.VERIFIED, list[str]()
     if failure is not None:

@@ -27,14 +27,13 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 
-#: Maximum number of bytes of one array in a block of frames. About ten arrays of this size exist at a time.
+#: Maximum number of bytes of one array in a block of frames.
+#: About ten arrays of this size exist at a time.
 BLOCK_BYTES = 32 * 2**20
 
 
 @dataclass(frozen=True, slots=True)
 class SecondOracleModel:
-    """A second oracle besides Pinocchio, and its model of the robot."""
-
     library: OracleLibrary
     oracle: Oracle
 
@@ -59,18 +58,9 @@ def tallies(
     clock: Clock,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, Tally]:
-    """Compare the results for all frames and joints of a robot with the oracle's results.
+    """Return the error statistics of each quantity of a robot in each reference frame.
 
-    Args:
-        robot: The robot.
-        oracle: Pinocchio's model of it.
-        x: The samples.
-        first_sample: Index of the first sample.
-        clock: Receives the computing times.
-        second: The second oracle; None: compare with Pinocchio only.
-
-    Returns:
-        The error statistics of each quantity in each reference frame.
+    `oracle` is Pinocchio's model. The clock receives the computing times.
     """
     found: dict[Key, Tally] = {}
     work = robot, oracle, x, first_sample, clock
@@ -87,18 +77,13 @@ def frame_bytes(samples: int, nv: int) -> int:
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items into slices of at most `BLOCK_BYTES`, if each item has `size` bytes.
-
-    Return at least one slice.
-    """
+    """Divide `count` items of `size` bytes into slices of at most `BLOCK_BYTES`; yield at least one slice."""
     most = max(1, BLOCK_BYTES // size)
     for start in range(0, max(1, count), most):
         yield slice(start, min(count, start + most))
 
 
 class _Work:
-    """A batch of samples of a robot, and the error statistics of its comparisons."""
-
     def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> None:
         self.robot, self.oracle, self.x, self.first, self.clock = robot, oracle, x, first_sample, clock
         rows = zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True)
@@ -109,10 +94,7 @@ class _Work:
 
 
 class _Block(_Work):
-    """The comparisons of urdfkin with the oracles for a block of frames.
-
-    The block includes each joint whose child link is in the block.
-    """
+    """The comparisons for a block of frames, and for each joint whose child link is in the block."""
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock, frames: slice
@@ -121,13 +103,12 @@ class _Block(_Work):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # The robot caches the compiled tree of all its frames. For a block of frames, the tree is compiled
-        # again.
+        # The robot caches the compiled tree of all frames only.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
-        # The Jacobian of the frame at a joint is the Jacobian of the joint's child link. In the list of
-        # frames, the links come first, beginning with the root.
+        # The Jacobian of the frame at a joint is the Jacobian of the joint's child link.
+        # In the list of frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
@@ -150,11 +131,10 @@ class _Block(_Work):
                     yield self._compare(joint, reference, ours[:, self.joint_rows], self.part(bound), second)
 
     def part(self, bound: Bound) -> Bound:
-        """Return the bounds of the block's joints; `bound` contains the bounds of the block's frames."""
+        """Return the bounds of the block's joints, from the bounds of the block's frames."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def asked(self, row: Quantity, reference: Reference | None) -> QueryBatch:
-        """Return the query to the oracle: the frames or joints, and the inputs that the quantity needs."""
         joints = row.of == "joints"
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a
@@ -213,10 +193,7 @@ class _Screws(_Work):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return the configuration of the tree in which mimic joints are independent.
-
-    The values of the mimic joints follow their mimic rules.
-    """
+    """Return configurations of the tree `free`, whose former mimic joints have the values of their rules."""
     spread = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

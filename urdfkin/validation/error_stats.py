@@ -53,12 +53,9 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class ThreeSides:
-    """Comparison of three libraries for one quantity in one reference frame.
-
-    Several comparisons can be added.
+    """Comparison of urdfkin, Pinocchio and a second oracle (`by`) for one quantity in one reference frame.
 
     Attributes:
-        by: Name of the second oracle.
         urdfkin: urdfkin compared with the second oracle.
         pinocchio: Pinocchio compared with the second oracle.
         alone: For each library of `SIDES`, the number of results in which only this library differs from the
@@ -84,12 +81,10 @@ class ThreeSides:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the entry of a report."""
         return asdict(self) | {"alone": dict(zip(SIDES, self.alone, strict=True))}
 
 
 def plus(first: ThreeSides | None, second: ThreeSides | None) -> ThreeSides | None:
-    """Return the sum of two comparisons; None is an empty comparison."""
     return first if second is None else second if first is None else first + second
 
 
@@ -98,13 +93,8 @@ def three_sides(
 ) -> ThreeSides:
     """Compare three results (n, frames, ...) with each other.
 
-    Args:
-        by: Name of the second oracle.
-        ours: Results of urdfkin.
-        pinocchios: Results of Pinocchio.
-        second_oracles: Results of the second oracle.
-        first: Bound on the difference between urdfkin and Pinocchio.
-        second: Bound on the difference between urdfkin and the second oracle.
+    The bound `first` limits the difference between urdfkin and Pinocchio, `second` the difference between
+    urdfkin and the second oracle.
     """
     if not ours.size:
         return ThreeSides(by, Pair(), Pair())
@@ -130,11 +120,7 @@ def three_sides(
 
 
 def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArray, FloatArray]:
-    """Return two arrays (n, frames) of disagreements.
-
-    The first array contains the ratios of disagreement to bound. The second array contains the disagreements
-    in eps * scale.
-    """
+    """Return two arrays (n, frames): ratios of disagreement to bound, and disagreements in eps * scale."""
     units = worst_of_each(one, other, bound.scale, 2)
     share: FloatArray = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
     return share, units
@@ -147,11 +133,10 @@ def _together(first: Bound, second: Bound) -> Bound:
         return Bound(size / second.k, second.k)
 
 
-#: Edges of the histogram of disagreements, in eps * scale: ten bins a decade from 0.001 to 100,000.
+#: Edges of the histogram of disagreements, in eps * scale: ten bins per decade from 0.001 to 100,000.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
 
 
-#: The inputs q, v and a of one sample.
 Inputs = tuple[list[float], list[float], list[float]]
 
 
@@ -214,25 +199,19 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return the common statistics of the frames in `self` and the frames in `other`.
-
-        The two tallies must belong to the same samples.
-        """
+        """Return the statistics of the frames in `self` and `other` together, for the same samples."""
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements.
-
-        Its error is at most the width of a histogram bin, 26 %.
-        """
+        """Return a percentile of the disagreements; its error is at most a histogram bin, 26 %."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of the values in a histogram; the accuracy of the result is the width of a bin."""
+    """Return a percentile of the values in a histogram, to the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -241,7 +220,6 @@ def percentile(
 
 
 def histogram_bin(units: float, edges: Sequence[float] | FloatArray) -> int:
-    """Return the index of the histogram bin that counts a disagreement."""
     return int(np.searchsorted(edges, units, side="right"))
 
 
@@ -257,15 +235,10 @@ def tally(
     first_sample: int,
     inputs: Sequence[Inputs],
 ) -> Tally:
-    """Compare results of urdfkin and Pinocchio.
+    """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
-    Args:
-        ours: (n, frames, ...) results of urdfkin.
-        theirs: (n, frames, ...) results of Pinocchio.
-        bound: Bound whose scale and k can be broadcast to the shape of the results.
-        frames: A name for each frame.
-        first_sample: Index of the first of the n samples.
-        inputs: q, v and a of each sample, for the worst case.
+    The scale and k of the bound can be broadcast to the shape of the results. `inputs` are q, v and a of each
+    sample, for the worst case.
     """
     n, count = ours.shape[:2]
     if not ours.size:

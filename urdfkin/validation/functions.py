@@ -1,9 +1,8 @@
 """Compare a user's function with urdfkin and the oracle, within the derived bound.
 
 The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
-function at random configurations, at the zero configuration and at the joint limits. First, the module
-compares urdfkin's results at these configurations with the oracle's results. If urdfkin and the oracle agree,
-but the function disagrees with urdfkin, the error is in the function.
+function at random configurations, at the zero configuration and at the joint limits. If urdfkin and the
+oracle agree there, but the function disagrees with urdfkin, the error is in the function.
 """
 
 from __future__ import annotations
@@ -40,24 +39,19 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
-#: Configurations are computed in batches of `_AT_A_TIME`. A diagnosis uses `_DIAGNOSED` configurations.
+#: Number of configurations in a batch.
 _AT_A_TIME = 256
+#: Number of configurations in a diagnosis.
 _DIAGNOSED = 48
-#: Largest number of exceptions and wrong shapes that are stored with their message.
+#: Largest number of exceptions and wrong shapes with a stored message.
 _KEPT = 5
-#: If a function's results differ from urdfkin's by this relative amount or less, the diagnosis is "the
-#: function rounds to single precision".
+#: A relative difference up to this number is explained by rounding to single precision.
 _SINGLE = 1e-5
 
 
 @dataclass(frozen=True)
 class FunctionError:
-    """An exception of the user's function, or a result that is not an array of the right shape.
-
-    Attributes:
-        sample: Index of the configuration.
-        message: The text of the exception, or a text that states the wrong shape.
-    """
+    """An exception of the user's function, or a result that is not an array of the right shape."""
 
     sample: int
     message: str
@@ -330,8 +324,6 @@ def verify_function(
 
 @dataclass(frozen=True)
 class _How:
-    """The arguments of `verify_function`, validated."""
-
     row: Quantity
     frame: str
     reference: Reference | None
@@ -371,18 +363,13 @@ class _Compared:
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Return the differences between `found` and `other`, in units of eps * scale.
-
-        A difference that is not finite becomes inf.
-        """
+        """Return the differences between `found` and `other` in eps * scale; inf if not finite."""
         with np.errstate(all="ignore"):
             units = disagreement(self.found, other, Bound(self.scale, self.k))
         return np.where(np.isfinite(units), units, np.inf)
 
 
 class _Run:
-    """One check of a function."""
-
     def __init__(
         self, function: Callable[..., object], robot: Robot, conversion: Conversion | None, how: _How
     ) -> None:
@@ -558,7 +545,7 @@ class _Run:
         total: _Total,
         good: list[int],
     ) -> FloatArray:
-        """Return those results of the function that have the right shape; add their indices to `good`."""
+        """Return the function's results of the right shape; add their indices to `good`."""
         n, found = len(inputs[0]), list[FloatArray]()
         if self.how.batch:
             array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
@@ -617,8 +604,6 @@ class _Run:
 
 @dataclass
 class _Total:
-    """The comparison of all configurations so far."""
-
     row: Quantity
     factor: float
     row_names: tuple[str, ...]
@@ -645,7 +630,6 @@ class _Total:
             self.first_errors.append(FunctionError(sample, message))
 
     def add(self, part: _Compared) -> None:
-        """Add some configurations."""
         self.shape = part.expected.shape[1:]
         if not part.good:
             return
@@ -675,10 +659,7 @@ class _Total:
             self.oracle_share = max(self.oracle_share, float(part.shares(part.theirs).max(initial=0.0)))
 
     def for_diagnosis(self) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
-        """Return the data of some configurations for a diagnosis.
-
-        The data are the inputs, the function's results, urdfkin's results, and the scale.
-        """
+        """Return some inputs, results of the function, results of urdfkin, and scales."""
         assert self.kept is not None
         good = np.array(self.kept.good[:_DIAGNOSED])
         n = len(good)
@@ -694,10 +675,7 @@ def _call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Return a copy of the function's result.
-
-    An exception or a wrong shape is added to `total`, and the result is then None.
-    """
+    """Return a copy of the function's result; None for an exception or a wrong shape, added to `total`."""
     try:
         given = np.asanyarray(function(*inputs))
         if np.ma.isMaskedArray(given) or given.dtype.kind not in "fiu":

@@ -48,13 +48,11 @@ class Manifest:
 
     @classmethod
     def of(cls, subjects: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
-        """Return the manifest of a new validation, which is written before the first computation."""
         robots = tuple((subject.origin, subject.stamp) for subject in subjects)
         return cls(robots, samples, seed, provenance(), _versions(subjects), started)
 
     @cached_property
     def cut(self) -> Cut:
-        """The division of each robot's samples into chunks."""
         return Cut(self.samples)
 
     def subjects(self) -> list[RobotInput]:
@@ -67,7 +65,7 @@ class Manifest:
 
     @cached_property
     def _keys(self) -> list[str]:
-        """The key of each robot, which is a sha256 of the robot's text, the settings and the versions."""
+        """The key of each robot: a sha256 of the robot's text, the settings and the versions."""
         settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
@@ -75,24 +73,16 @@ class Manifest:
         ]
 
     def as_json(self) -> bytes:
-        """Return the bytes of the file."""
         return (json.dumps({"schema": LAYOUT} | as_data(self), indent=1) + "\n").encode()
 
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
-        """Read a manifest from the bytes of a file.
-
-        Raises:
-            InputError: The file is not JSON or not a manifest, or has another layout.
-        """
+        """Read a manifest; raise InputError for a file that is no manifest, or has another layout."""
         layout = Layout(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
         return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
-        """Return the differences from another manifest, each with the values in the two manifests.
-
-        The result is empty if the two manifests define the same chunks.
-        """
+        """Return the differences of the definitions of chunks, each with the values of both manifests."""
         own, theirs = (
             {"samples": m.samples, "seed": m.seed, "number of robots": len(m.robots)} | m.provenance
             for m in (self, other)
@@ -115,7 +105,7 @@ def _versions(subjects: Sequence[RobotInput]) -> dict[str, str]:
 
 
 def _short(value: object) -> str:
-    """Shorten a digest to its first 12 characters."""
+    """Return the first 12 characters of a digest; return other values as text."""
     text = str(value)
     return text[:12] if len(text) == 64 else text
 

@@ -1,6 +1,6 @@
 """Define the report of a validation, and the versions on which the report's numbers depend.
 
-`ValidationReport.as_dict` returns the JSON document, whose layout `urdfkin.validation.document` defines.
+`urdfkin.validation.document` defines the layout of the JSON document.
 """
 
 from __future__ import annotations
@@ -34,10 +34,8 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages of urdfkin that only display results.
-#: The code of these packages may change between two runs of a campaign.
+#: Packages that only display results; their code may change during a campaign.
 _SHOWING = ("cli", "report", "view")
-#: Libraries that compute results or read robots.
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
 
@@ -110,10 +108,7 @@ class RobotReport:
         return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
     def worst(self, quantity: str) -> float | None:
-        """Return the largest disagreement of a quantity, in eps * scale.
-
-        The result is None if the quantity was not compared.
-        """
+        """Return the largest disagreement of a quantity, in eps * scale; None: it was not compared."""
         return max((tally.worst for tally in self.of(quantity)), default=None)
 
     def replay(self, key: Key) -> str | None:
@@ -179,7 +174,7 @@ class RobotReport:
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
     """Return the command that computes a case again."""
     row = QUANTITIES[quantity]
-    # The name of a joint can also be the name of a link, so the prefix "joint:" marks the joint.
+    # The prefix "joint:" is needed because a link may have the same name.
     frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
     origin = replace(origin, oracle=None)  # the command compares the result with Pinocchio
     return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
@@ -265,10 +260,7 @@ class ValidationReport(Displayable):
         return self.outcome.exit_code
 
     def as_dict(self) -> Document:
-        """Return the JSON document.
-
-        If a disagreement is infinite or NaN, the document contains null.
-        """
+        """Return the JSON document; an infinite or NaN disagreement becomes null."""
         judgements = iter(self.judgements)  # only compared robots have an accuracy result
         document = {
             "schema": VALIDATION.name,
@@ -292,10 +284,7 @@ class ValidationReport(Displayable):
 
 
 def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
-    """Group the robots that a single command can validate.
-
-    The robots of a group have the same options, and at most one comes from standard input.
-    """
+    """Group the robots by options; a group has at most one robot from standard input."""
     groups: dict[tuple[str, int], list[Origin]] = {}
     texts = Counter[str]()
     for origin in origins:

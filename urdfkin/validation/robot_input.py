@@ -28,7 +28,6 @@ from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_usd, is_xacro, read_source
 from urdfkin.verify.oracles import ORACLES, PINOCCHIO
 
-#: Input of a validation: anything that `load` accepts, or a loaded robot.
 Given = Source | DHTable | Robot
 
 
@@ -54,7 +53,6 @@ class RobotInput:
 
     @classmethod
     def of(cls, robot: Robot) -> RobotInput:
-        """Return the input for a loaded robot."""
         if robot.source in catalogue():
             found = _word(robot.source, robot.origin.mimic, robot.origin.root_joint)
             return replace(found, origin=replace(found.origin, lock=robot.origin.lock))
@@ -125,7 +123,7 @@ def subjects(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
-    """Return the robots as plain data, and a dict of reading errors with the robot's index as the key."""
+    """Return the robots as plain data, and reading errors by the robot's index."""
     found, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:
@@ -144,7 +142,6 @@ def subject(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> RobotInput:
-    """Return one robot as plain data; an error in reading the robot is raised."""
     found = _subject(robot, mimic, root_joint, xacro_args)
     if isinstance(lock, str | Mapping) and not lock and joints is None:
         return found
