@@ -62,8 +62,7 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the fraction of the difference that remains with a simulated mistake, for the first n
-        results.
+        """Return the fraction of the first n differences that remains after a simulated mistake.
 
         The fraction is 0 if urdfkin's results with the mistake (`predicted`) equal the user's results.
         """

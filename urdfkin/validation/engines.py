@@ -63,7 +63,7 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, Row] | None:
-        """Return a task for an idle worker, if possible of a new robot, and the robot's other tasks, or None."""
+        """Return a task for an idle worker, preferably of a new robot, and the robot's other tasks."""
         for row in self._waiting:
             self._begun.append(row)
             if (task := self.next(row)) is not None:

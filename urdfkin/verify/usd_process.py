@@ -51,16 +51,11 @@ def serve() -> None:
         }
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
-    os._exit(0)  # end the process without the exit handlers of the libraries
+    os._exit(0)  # the exit handlers of the libraries are skipped
 
 
 def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the answer to a request.
-
-    Args:
-        request: Mapping with `path`, `name` (the file's name in messages), `variants`, `articulation`, and
-            `check` (whether to compare with OpenUSD's readers).
-    """
+    """Return the answer to a request; with `check`, the answer has the data of OpenUSD's readers."""
     read = read_usd(
         request["path"],
         request["name"],
@@ -84,7 +79,7 @@ def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _second_reading(read: Usd) -> dict[str, Any]:
-    """Return urdfkin's and OpenUSD's data of each joint. The keys are the paths of the joints' prims."""
+    """Return urdfkin's and OpenUSD's data of each joint, by the path of the joint's prim."""
     pxr = library()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
@@ -93,7 +88,7 @@ def _second_reading(read: Usd) -> dict[str, Any]:
         parsed = load(read.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
-            # a joint with PhysicsArticulationRootAPI has another description, that of the articulation
+            # A joint with PhysicsArticulationRootAPI has a second description, that of the articulation.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _described(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
@@ -110,7 +105,7 @@ def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
-        ends = own.get(free.lower())  # None if several directions are free
+        ends = own.get(free.lower())  # `ends` is None if several directions are free
     factor = np.pi / 180.0 if free.startswith("rot") else read.unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)

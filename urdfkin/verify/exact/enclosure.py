@@ -72,25 +72,14 @@ class Enclosure:
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return a bool array, which is True for each number of `x` that lies between `lower` and `upper`.
-
-        Args:
-            x: Values, of the quantity's shape.
-
-        Raises:
-            InputError: `x` has a different shape.
-        """
+        """Return whether each number of `x` is between `lower` and `upper`; other shapes raise InputError."""
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 
     def error(self, x: ArrayLike) -> FloatArray:
         """Return an upper bound on the difference between each number of `x` and the true value.
 
-        Args:
-            x: Values, of the quantity's shape.
-
-        Raises:
-            InputError: `x` has a different shape.
+        If `x` has a different shape than the quantity, InputError is raised.
         """
         x = self._alike(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
@@ -160,19 +149,7 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """Return intervals that contain the true results of one frame for one sample.
-
-    `Robot.enclose` explains most arguments.
-
-    Args:
-        verifier: Verifier of the robot.
-        plan_of: Function that returns the compiled tree for some links.
-        inputs: q (nq,), v (nv,) and a (nv,).
-        frame: Name of a link or joint.
-        reference: Reference frame.
-        base: Motion of the root link; None: fixed at the world origin.
-        digits: Decimal digits, or None for the default.
-        hessian: Whether to compute the intervals of the Hessian too.
+    """Return intervals that contain the true results of one frame for one sample (`Robot.enclose`).
 
     Raises:
         InputError: a batch of inputs, a wrong length, or an invalid number of digits.
