@@ -334,19 +334,18 @@ def _value(text: str) -> Value:
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
     """Return the effect of one joint's changes: `same` compares the old robot with a changed copy."""
-    trees = old, new
-    if any(name not in {joint.name for joint in tree.joints} for tree in trees):
+    names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
+    if name not in names & new_names:
         return None
-    at, there = (tree.joint_index(name) for tree in trees)
-    ends = [
-        (tree.links[tree.joints[i].parent], tree.links[i + 1])
-        for tree, i in zip(trees, (at, there), strict=True)
-    ]
-    joint = trees[1].joints[there]
-    if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in {j.name for j in trees[0].joints}):
+    at, there = old.joint_index(name), new.joint_index(name)
+    joint = new.joints[there]
+    ends = [(tree.links[tree.joints[i].parent], tree.links[i + 1]) for tree, i in ((old, at), (new, there))]
+    if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in names):
         return None
+    joints = list(old.joints)
+    joints[at] = replace(joint, parent=joints[at].parent)
     try:
-        changed, plain = (_quietly(tree) for tree in (_with_joint(trees[0], at, joint), trees[0]))
+        changed, plain = (_quietly(tree) for tree in (replace(old, joints=tuple(joints)), old))
     except InputError:  # a URDF cannot describe this copy
         return None
     worst = same(plain, changed).worst_as_written
@@ -357,9 +356,3 @@ def _quietly(tree: KinematicTree) -> Robot:
     """Return a robot without warnings about the URDF that urdfkin writes for its tree."""
     text = Text(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)
-
-
-def _with_joint(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:
-    joints = list(tree.joints)
-    joints[at] = replace(joint, parent=joints[at].parent)
-    return KinematicTree(tree.name, tree.links, tuple(joints))

@@ -183,8 +183,8 @@ def _reading(
     poses = dict(zip(shared, both.swapaxes(0, 1), strict=True))
     elements = _elements(source) if form == "urdf" else {}
     own = [joint for joint in answer["joints"] if joint in values[0]]
-    added = next((joint.name for joint in robot.tree.joints if joint.name not in elements), None)
-    added = added if form == "urdf" else None
+    new = (joint.name for joint in robot.tree.joints if form == "urdf" and joint.name not in elements)
+    added = next(new, None)
     return LibraryReading(
         title,
         number,
@@ -294,20 +294,16 @@ def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str
         return "turns it the other way"
     elif np.abs(theirs[:, :3, :3] @ theirs[:, :3, :3].swapaxes(-1, -2) - np.eye(3)).max() > equal:
         return "returns a matrix that is no rotation"
-    direction = theirs[0, :3, 3]
-    if joint.kind is not JointKind.PRISMATIC:
-        S = theirs[0, :3, :3] - theirs[0, :3, :3].T
-        direction = np.array([S[2, 1], S[0, 2], S[1, 0]])
+    direction, own = (_direction(joint, T[0]) for T in (theirs, mine))
     if (length := math.hypot(*direction)) <= equal:
         return "does not move it"
-    direction = np.round(direction / length * _sense(joint, mine[0]), 6) + 0.0
-    x, y, z = (f"{number:.4g}" for number in direction)
+    sense = 1.0 if own @ joint.axis >= 0.0 else -1.0
+    x, y, z = (f"{number:.4g}" for number in np.round(direction / length * sense, 6) + 0.0)
     return f"moves it along another axis: {x} {y} {z}"
 
 
-def _sense(joint: Joint, mine: FloatArray) -> float:
-    """Return the sign of the joint's first motion about or along its axis."""
-    own = mine[:3, 3]
-    if joint.kind is not JointKind.PRISMATIC:
-        own = np.array([mine[2, 1] - mine[1, 2], mine[0, 2] - mine[2, 0], mine[1, 0] - mine[0, 1]])
-    return 1.0 if own @ joint.axis >= 0.0 else -1.0
+def _direction(joint: Joint, T: FloatArray) -> FloatArray:
+    """Return a vector along the displacement of a prismatic joint, or along the axis of a rotation."""
+    if joint.kind is JointKind.PRISMATIC:
+        return T[:3, 3]
+    return np.array([T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]])

@@ -763,12 +763,15 @@ def _is_tool(found: Alignment, frame: FramePair) -> bool:
 
 def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...]:
     """Return the differences that affect motion, ordered from the base to the tips."""
-    tree_a, tree_b = found.a.tree, found.b.tree
+    tree_a, tree_b, tolerance = found.a.tree, found.b.tree, tolerance_of(found.a, found.b)
     placed: list[tuple[float, list[Difference]]] = [
         (len(found.path(i)), _of_step(found, variables, i)) for i in range(len(found.steps))
     ]
     placed += [
-        (len(found.path(frame.previous)) + 0.5, [_of_frame(found, frame)])
+        (
+            len(found.path(frame.previous)) + 0.5,
+            [Difference(f"link {tree_a.links[frame.a]}", "place", None, None, *_beyond(frame, tolerance))],
+        )
         for frame in found.frames
         if frame.differs
     ]
@@ -828,11 +831,6 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
 def _beyond(one: Step | FramePair, rounding: Tolerance) -> tuple[float, float]:
     """Return the tilt (rad) and shift (m) of a joint or frame between A and B; 0 if within rounding."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
-
-
-def _of_frame(found: Alignment, frame: FramePair) -> Difference:
-    sizes = _beyond(frame, tolerance_of(found.a, found.b))
-    return Difference(f"link {found.a.tree.links[frame.a]}", "place", None, None, *sizes)
 
 
 def remarks(

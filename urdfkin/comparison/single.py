@@ -236,12 +236,14 @@ class JointComparison:
         """Yield the differences of a planar or floating joint, which must be attached to the root body."""
         a, b = self.found.a, self.found.b
         ends = [(a, paths[0]), (b, paths[1])]
-        if not all(len(path) == 1 and not _body_before(mechanism, path[0]) for mechanism, path in ends):
+        parents = [mechanism.tree.joints[path[0]].parent for mechanism, path in ends]
+        bodies = [a.body_of[parents[0]], b.body_of[parents[1]]]  # the root body has the index 0
+        if any(bodies) or not all(len(path) == 1 for path in paths):
             why = "follows a planar or floating joint that is not compared joint by joint"
             yield JointDifference(name, "", None, why)
             return
         for T, other in (
-            [mechanism.homes[mechanism.tree.joints[path[0]].parent] for mechanism, path in ends],
+            [mechanism.homes[link] for (mechanism, _), link in zip(ends, parents, strict=True)],
             [mechanism.homes[path[0] + 1] for mechanism, path in ends],
         ):
             if not self.tolerance.holds(*apart(T, self.base @ other)):

@@ -41,7 +41,7 @@ class SecondOracleModel:
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> ThreeSides:
         """Compare the results of three libraries, for the frames or joints of a block."""
-        answers = block.clock.second_oracle(row.ask, self.oracle, block.asked(row, reference))
+        answers = block.clock.timed("second", row.ask, self.oracle, block.asked(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
         )
@@ -124,7 +124,7 @@ class _Block(_Work):
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
-                ours = self.clock.ours(row.ours, self.plan, inputs, reference)
+                ours = self.clock.timed("urdfkin", row.ours, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
                 yield self._compare(row, reference, ours, bound, second)
                 for joint in joints:
@@ -150,7 +150,7 @@ class _Block(_Work):
         second: SecondOracleModel | None,
     ) -> tuple[Key, Tally]:
         names = self.joint_names if row.of == "joints" else self.frames
-        theirs = self.clock.theirs(row.ask, self.oracle, self.asked(row, reference))
+        theirs = self.clock.timed("pinocchio", row.ask, self.oracle, self.asked(row, reference))
         found = self.tally(ours, theirs, bound, names)
         if second is not None:
             found = replace(found, three_sides=second.three_sides(self, row, reference, ours, theirs))
@@ -168,7 +168,7 @@ class _Screws(_Work):
         robot, x = self.robot, self.x
         tree = freed(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.clock.theirs(SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(1, 2)
+        theirs = self.clock.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):
@@ -182,7 +182,7 @@ class _Screws(_Work):
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
         size = magnitudes(plan, q, *still, STILL_STATE)
-        J = self.clock.ours(SCREWS.ours, plan, (q,), Reference.WORLD)
+        J = self.clock.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T

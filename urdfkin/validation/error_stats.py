@@ -183,9 +183,7 @@ class Tally:
     three_sides: ThreeSides | None = None
 
     def __add__(self, other: Tally) -> Tally:
-        first, second = self.case, other.case
-        if first is None or (second is not None and _before(second, first)):
-            first = second
+        cases = [case for case in (self.case, other.case) if case is not None]
         return Tally(
             self.results + other.results,
             self.failed + other.failed,
@@ -193,7 +191,7 @@ class Tally:
             max(self.share, other.share),
             tuple(a + b for a, b in zip(self.histogram, other.histogram, strict=True)),
             tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
-            first,
+            max(cases, key=lambda case: (case.share, -case.sample), default=None),
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
             plus(self.three_sides, other.three_sides),
         )
@@ -221,10 +219,6 @@ def percentile(
 
 def histogram_bin(units: float, edges: Sequence[float] | FloatArray) -> int:
     return int(np.searchsorted(edges, units, side="right"))
-
-
-def _before(case: WorstCase, other: WorstCase) -> bool:
-    return (case.share, -case.sample) > (other.share, -other.sample)
 
 
 def tally(

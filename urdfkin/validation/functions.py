@@ -456,14 +456,10 @@ class _Run:
             scale = self._converted_scale(ours, scale)
             k = k + self._rounding_of_the_conversion(ours[0]) * self.how.factor
         expected = self._converted(ours, result)
-        compared = _Compared(first, inputs, [], expected, expected, scale, k, None)
-        found = self._called(inputs, expected.shape[1:], first, total, compared.good)
-        good = compared.good
-        compared.found, compared.expected = found, expected[good]
-        compared.scale, compared.k = scale[good], k[good]
+        found, good = self._called(inputs, expected.shape[1:], first, total)
         if theirs is not None:
-            compared.theirs = self._converted(ours, np.asarray(theirs)[:, 0])[good]
-        return compared
+            theirs = self._converted(ours, np.asarray(theirs)[:, 0])[good]
+        return _Compared(first, inputs, good, found, expected[good], scale[good], k[good], theirs)
 
     def _method(
         self,
@@ -538,35 +534,29 @@ class _Run:
         return 16.0 + 2.0 * row.factors * len(self.robot.tree.joints) * float(np.abs(q).max(initial=1.0))
 
     def _called(
-        self,
-        inputs: tuple[FloatArray, ...],
-        shape: tuple[int, ...],
-        first: int,
-        total: _Total,
-        good: list[int],
-    ) -> FloatArray:
-        """Return the function's results of the right shape; add their indices to `good`."""
-        n, found = len(inputs[0]), list[FloatArray]()
+        self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
+    ) -> tuple[FloatArray, list[int]]:
+        """Return the function's results of the right shape, and their indices."""
+        n = len(inputs[0])
         if self.how.batch:
             array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
-            good += range(n) if array is not None else ()
-            return np.zeros((0, *shape)) if array is None else array
+            return (np.zeros((0, *shape)), []) if array is None else (array, list(range(n)))
+        found = dict[int, FloatArray]()
         for k in range(n):
             array = _call(self.function, [x[k].copy() for x in inputs], shape, first + k, total, 1)
             if array is not None:
-                found.append(array)
-                good.append(k)
-        return np.array(found).reshape(len(found), *shape)
+                found[k] = array
+        return np.array(list(found.values())).reshape(len(found), *shape), list(found)
 
     # -- explanations --------------------------------------------------------------------------------
 
     def _diagnoses(self, total: _Total) -> Iterator[str]:
         if total.wrong_shapes and not total.compared:
-            words = _of_shape(next(iter(total.wrong_shapes)), total.shape)
-            if words:
-                yield words
+            shape = next(iter(total.wrong_shapes))
+            if len(shape) > 1 and shape == total.shape[::-1]:
+                yield f"the result is transposed: its shape is {shape} in place of {total.shape}"
             return
-        if not total.kept:
+        if (kept := total.kept) is None:
             return
         if total.not_finite:
             yield f"{total.not_finite} results are not finite"
@@ -574,15 +564,16 @@ class _Run:
         if total.eps_scale * EPS <= _SINGLE and math.isfinite(total.share):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
             yield (
-                f"all differences are below {total.eps_scale * EPS:.1g} of the terms' size, as rounding in"
-                f" {precision} precision leaves;"
+                f"rounding in {precision} precision explains all differences: they are below"
+                f" {total.eps_scale * EPS:.1g} of the terms' size;"
                 f" factor={math.ceil(total.share * self.how.factor)} accepts them"
             )
             return
-        inputs, found, expected, scale = total.for_diagnosis()
         mistakes = Mistakes(self.robot, self.how.row, self.how.frame, self.how.reference, self.conversion)
-        diagnosis = Diagnosis(inputs, found, expected, scale, self.expected)
-        yield from diagnose(mistakes, diagnosis)
+        some = slice(_DIAGNOSED)
+        inputs = tuple(x[kept.good[some]] for x in kept.inputs)
+        case = Diagnosis(inputs, kept.found[some], kept.expected[some], kept.scale[some], self.expected)
+        yield from diagnose(mistakes, case)
 
     def _replay(self, values: tuple[FloatArray, ...]) -> str:
         _, call, _ = self.recorder.calls[self.how.row.name]
@@ -658,14 +649,6 @@ class _Total:
         if part.theirs is not None:
             self.oracle_share = max(self.oracle_share, float(part.shares(part.theirs).max(initial=0.0)))
 
-    def for_diagnosis(self) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
-        """Return some inputs, results of the function, results of urdfkin, and scales."""
-        assert self.kept is not None
-        good = np.array(self.kept.good[:_DIAGNOSED])
-        n = len(good)
-        inputs = tuple(x[good] for x in self.kept.inputs)
-        return inputs, self.kept.found[:n], self.kept.expected[:n], self.kept.scale[:n]
-
 
 def _call(
     function: Callable[..., object],
@@ -691,12 +674,6 @@ def _call(
         total.error(sample, f"shape {found.shape}, expected {shape}", configurations)
         return None
     return found
-
-
-def _of_shape(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
-    if len(found) > 1 and found == expected[::-1]:
-        return f"the result is transposed: its shape is {found} in place of {expected}"
-    return ""
 
 
 def _tuple(x: FloatArray | tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:

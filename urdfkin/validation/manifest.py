@@ -49,7 +49,8 @@ class Manifest:
     @classmethod
     def of(cls, subjects: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
         robots = tuple((subject.origin, subject.stamp) for subject in subjects)
-        return cls(robots, samples, seed, provenance(), _versions(subjects), started)
+        oracles = (subject.origin.oracle for subject in subjects)
+        return cls(robots, samples, seed, provenance(), versions(oracles), started)
 
     @cached_property
     def cut(self) -> Cut:
@@ -98,10 +99,6 @@ class Manifest:
             if mine_ != theirs_
         ]
         return [*lines[:_SHOWN], f"{len(lines) - _SHOWN} more"] if len(lines) > _SHOWN + 1 else lines
-
-
-def _versions(subjects: Sequence[RobotInput]) -> dict[str, str]:
-    return versions(subject.origin.oracle for subject in subjects)
 
 
 def _short(value: object) -> str:

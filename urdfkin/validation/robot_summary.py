@@ -16,7 +16,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from urdfkin.dh import DHRow, DHTable
+from urdfkin.dh import DHTable
 from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
 from urdfkin.model.configuration import NarrowedRange, draw, narrowed_ranges
@@ -126,7 +126,11 @@ def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
 
 def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
     data: dict[str, Any] = {
-        name: {"rows": [_row(row) for row in table.rows], "base": table.base, "tool": table.tool}
+        name: {
+            "rows": [{entry: getattr(row, entry) for entry in Row.__annotations__} for row in table.rows],
+            "base": table.base,
+            "tool": table.tool,
+        }
         for name, table in tables.items()
     }
     if oracle is None:
@@ -139,10 +143,6 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
         "worst": max(units for check in checks for units in check.units.values()),
         "share_of_bound": max(share for check in checks for share in check.shares.values()),
     }
-
-
-def _row(row: DHRow) -> dict[str, Any]:
-    return {name: getattr(row, name) for name in Row.__annotations__}
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +166,7 @@ class RobotSummary:
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
         """Return the summary of a loaded robot; without an oracle, its tables are not checked."""
         mimic, added = robot.verifier.mimic, robot.root_joint is not None
-        reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added).as_dict())
+        reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
         return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
 
     @property

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import astuple, dataclass
 from typing import Any, ParamSpec, TypeVar
 
@@ -25,26 +24,11 @@ class Clock:
     compare: float = 0.0
     second: float = 0.0
 
-    def ours(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of urdfkin, and add its computing time."""
-        with self._add_time("urdfkin"):
-            return function(*args, **kwargs)
-
-    def theirs(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of Pinocchio, and add its computing time."""
-        with self._add_time("pinocchio"):
-            return function(*args, **kwargs)
-
-    def second_oracle(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of the second oracle, and add its computing time."""
-        with self._add_time("second"):
-            return function(*args, **kwargs)
-
-    @contextmanager
-    def _add_time(self, part: str) -> Iterator[None]:
+    def timed(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        """Call a function, and add its computing time to a part, such as "urdfkin"."""
         begin = time.perf_counter()
         try:
-            yield
+            return function(*args, **kwargs)
         finally:
             setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 

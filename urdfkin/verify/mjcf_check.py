@@ -30,7 +30,7 @@ from urdfkin.urdf.mjcf import Listed, is_text, name_of
 from urdfkin.urdf.mujoco import version
 from urdfkin.verify.bounds import Bound, about_the_root, magnitudes, mjcf_placement_bound, result_k
 from urdfkin.verify.comparison import worst_of_each
-from urdfkin.verify.mjcf_process import TOO_MUCH, unpacked
+from urdfkin.verify.mjcf_process import TOO_MUCH, complete_lines, unpacked
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
@@ -98,7 +98,7 @@ def read_mjcf(
             "MuJoCo cannot compile this MJCF",
             where=name,
             found=ending,
-            remedy="check it for very large numbers, for example in <replicate>",
+            remedy="check the file for very large numbers, for example in <replicate>",
         )
     reasons = [answer["not_whole"] for answer in answers if "not_whole" in answer]
     return MjcfReading(
@@ -124,17 +124,12 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
     output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
-    answers = [json.loads(line) for line in output.splitlines(keepends=True) if _is_answer(line)]
+    answers = [json.loads(line) for line in complete_lines(output)]
     if status is None:
         return answers, f"MuJoCo did not finish within {patience:g} s"
     if len(output) > MOST:
         return answers, f"an answer of more than {MOST} bytes"
     return answers, f"MuJoCo's process ended with status {status}: perhaps {TOO_MUCH}"
-
-
-def _is_answer(line: bytes) -> bool:
-    """Return whether a line of output is a complete answer, not text of a library or cut off by a crash."""
-    return line.startswith(b"{") and line.endswith(b"}\n")
 
 
 def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:

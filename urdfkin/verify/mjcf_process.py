@@ -75,6 +75,12 @@ def _say(answer: Mapping[str, Any]) -> None:
     sys.stdout.flush()
 
 
+def complete_lines(output: bytes) -> list[bytes]:
+    """Return the answers in a process's output, without texts of libraries and lines cut off by a crash."""
+    lines = output.splitlines(keepends=True)
+    return [line for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
+
+
 def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the answers to a request with the keys `path` or `text`, `name` (for messages) and `samples`.
 

@@ -75,8 +75,7 @@ def _known(name: str) -> OracleLibrary:
 def oracle_library(name: object) -> OracleLibrary:
     """Return the oracle with a name; raise UnknownNameError, or InputError if it is not installed."""
     wanted = as_str(name, "oracle")
-    oracle = next((one for one in ORACLES.values() if one.name == wanted), None)
-    if oracle is None:
+    if (oracle := ORACLES.get(wanted)) is None:
         raise UnknownNameError("oracle", wanted, ORACLES)
     if oracle is not PINOCCHIO:
         oracle.version()  # an error is raised now, not at the first check

@@ -22,7 +22,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -73,15 +73,6 @@ class SecondReading:
     differences: tuple[str, ...] = ()
     known: tuple[str, ...] = ()
     unread: str | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "by": self.by,
-            "joints": self.joints,
-            "differences": list(self.differences),
-            "known": list(self.known),
-            "unread": self.unread,
-        }
 
 
 def second_reading(

@@ -312,7 +312,7 @@ class _Explanation:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
         # Axes through one point a satisfy a x z = v, for the direction z of each axis.
         # The vector v is the linear part of the joint's Jacobian column.
-        crosses = np.concatenate([_cross_matrix(-axis) for axis in z])
+        crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
             return None
@@ -373,10 +373,6 @@ def _basis(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the row space of projections of orthonormal vectors."""
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding
-
-
-def _cross_matrix(z: FloatArray) -> FloatArray:
-    return np.array([[0.0, -z[2], z[1]], [z[2], 0.0, -z[0]], [-z[1], z[0], 0.0]])
 
 
 def _vector(x: FloatArray) -> str:

@@ -102,17 +102,13 @@ class TableCheck:
             )
         bound = "rounding and snapping" if self.snapped else "rounding"
         figures = self.shares if self.snapped else self.units
-        unit = "of the bound" if self.snapped else "in eps*scale"
-        worst = ", ".join(f"{name} {_figure(value, self.snapped)}" for name, value in figures.items())
+        unit, form = ("of the bound", ".0%") if self.snapped else ("in eps*scale", ".2g")
+        worst = ", ".join(f"{name} {value:{form}}" for name, value in figures.items())
         verdict = f"agrees within {bound}" if self.agrees else f"DISAGREES by more than {bound}"
         return (
             f"{verdict} on {self.samples} samples: tip within {self.metres:.2e} m and {self.radians:.2e} rad;"
             f" {unit}: {worst}"
         )
-
-
-def _figure(value: float, share: bool) -> str:
-    return f"{value:.0%}" if share else f"{value:.2g}"
 
 
 def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> TableCheck:

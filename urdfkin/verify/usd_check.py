@@ -43,9 +43,8 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.usd import Remark, version
-from urdfkin.verify.mjcf_process import unpacked
+from urdfkin.verify.mjcf_process import TOO_MUCH, complete_lines, unpacked
 from urdfkin.verify.quantities import PLACEMENT
-from urdfkin.verify.usd_process import TOO_MUCH
 from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
@@ -111,9 +110,7 @@ def read_usd(
         "from urdfkin.verify.usd_process import serve; serve()", options=("-B", "-X", "utf8")
     )
     output, status = ask_python(command, json.dumps(request).encode(), patience, _MOST)
-    lines = [
-        line for line in output.splitlines(keepends=True) if line.startswith(b"{") and line.endswith(b"}\n")
-    ]
+    lines = complete_lines(output)
     if not lines or len(output) > _MOST:
         ending = f"its process ended with status {status}: perhaps {TOO_MUCH}"
         if status is None:

@@ -22,12 +22,10 @@ from typing import Any
 import numpy as np
 
 from urdfkin.errors import UrdfkinError
-from urdfkin.urdf.confinement import MEMORY, limit
+from urdfkin.urdf.confinement import limit
 from urdfkin.urdf.usd import JointReading, Usd, library, read_usd
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verify.mjcf_process import packed
-
-TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+from urdfkin.verify.mjcf_process import TOO_MUCH, packed
 
 
 def serve() -> None:
