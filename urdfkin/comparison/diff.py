@@ -1,8 +1,7 @@
 """List the changes between two versions of a robot description, and bound how far they move the frames.
 
-Two files of one format are compared attribute by attribute. Files of two formats cannot be compared attribute
-by attribute, because each format has its own attributes. For such files, the changes are the differences that
-`same` finds.
+Two files of one format are compared attribute by attribute. Each format has its own attributes, so the
+changes between files of two formats are the differences that `same` finds.
 """
 
 from __future__ import annotations

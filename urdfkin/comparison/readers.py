@@ -43,14 +43,10 @@ _QUOTED = 200
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A joint that a library reads differently.
+    """A joint that a library reads differently, and the element of the file that explains the difference.
 
-    Attributes:
-        joint: Name of the joint.
-        element: Element of the file that explains the difference.
-        words: The difference in words.
-        size: Largest difference of an entry of the child link's pose in the parent link (m, or rotation
-            entry).
+    `size` is the largest difference of an entry of the child link's pose in the parent link (m, or rotation
+    entry).
     """
 
     joint: str
@@ -64,8 +60,6 @@ class LibraryReading:
     """The differences between a library and urdfkin in reading a robot file.
 
     Attributes:
-        library: Name of the library.
-        version: Version of the library.
         refused: Reason why the library does not read the file; None if it reads the file.
         joints: The joints with a coordinate in the library, in the library's order.
         same_order: Whether the library has the same joints as urdfkin, in the same order.

@@ -4,9 +4,8 @@ A sample depends only on the seed and on the index of the sample. Inputs and res
 data, so a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2 of a
 robot are the neutral configuration, the lower limits and the upper limits.
 
-Samples are drawn 25 at a time, each draw with its own seed. A chunk compares several draws together. The
-number of draws in a chunk does not change any result; it only changes the cost of distributing and storing
-chunks.
+Samples are drawn 25 at a time, each draw with its own seed. The number of draws in a chunk does not change
+any result; it only changes the cost of distributing and storing chunks.
 """
 
 from __future__ import annotations

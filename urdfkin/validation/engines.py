@@ -1,12 +1,8 @@
 """Engines that run chunks, and the queue that distributes chunks among workers.
 
-An engine runs tasks and passes each answer to a callback once, in any order. The collector sorts the answers
-by robot and chunk before it adds them, so no result depends on the engine. If a robot has failed, an engine
-may skip the remaining chunks of this robot. The engine must run all other chunks. Tasks are created only when
-they are needed, so a million tasks take no memory.
-
-The engines here run in this process, or on an executor with the interface of `concurrent.futures`.
-`urdfkin.validation.worker_processes` has an engine of local processes.
+An engine runs tasks and passes each answer to a callback once, in any order. The collector sorts the answers,
+so no result depends on the engine. If a robot has failed, an engine may skip the remaining chunks of this
+robot, but no others. Tasks are created only when they are needed, so a million tasks take no memory.
 
 Each worker gets its own robot, so that only one worker has to read this robot. If no robot is waiting, a free
 worker takes chunks of the robot with the most chunks left.

@@ -1,14 +1,11 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
-A `Tally` contains the statistics of one quantity in one reference frame. Two tallies can be added if they
-belong to different samples. The addition is commutative and associative, so the sum does not depend on the
-division of the samples into chunks. A sum of two tallies keeps the worse of the two worst cases. If both are
-equally bad, the sum keeps the case with the smaller sample number.
+The addition of two tallies is commutative and associative, so the sum does not depend on the division of the
+samples into chunks. If two worst cases are equally bad, the sum keeps the one with the smaller sample number.
 
-With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
-Each of the three pairs of libraries has its own bound. Two results agree if their difference lies within the
-bound of their pair. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two
-pairs. If two results agree and the third one agrees with neither of them, the third one is the outlier.
+With a second oracle, `ThreeSides` compares three results. Each of the three pairs of libraries has its own
+bound. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two
+results agree and the third one agrees with neither of them, the third one is the outlier.
 """
 
 from __future__ import annotations
@@ -162,14 +159,12 @@ class Tally:
         failed: Number of results outside their bound.
         worst: The largest disagreement, in eps * scale.
         share: The largest ratio of a disagreement to its bound.
-        histogram: (82,) number of results in each bin of the histogram. The first bin contains results below
-            the first of `HISTOGRAM_EDGES`, and the last bin contains results above the last edge. Each other
-            bin is between two adjacent edges.
+        histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between two
+            adjacent edges, and above the last edge.
         by_frame: The largest disagreement of each frame, in the robot's order.
         case: The sample with the largest ratio.
         bounds: The smallest and the largest bound of all results, in eps * scale. The bound for a frame grows
             with the number of joints on the path to the frame.
-        three_sides: The comparison with a second oracle; None without one.
     """
 
     results: int

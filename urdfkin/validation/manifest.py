@@ -1,8 +1,7 @@
 """Define the manifest of a stored validation: its robots, samples and versions.
 
-The manifest defines the chunks and their keys. The key of a chunk is the sha256 of all data on which the
-numbers of the chunk depend. If the code, the text of the robot or the options change, the keys change too.
-Therefore, results of older code, texts or options are never reused.
+The manifest defines the chunks and their keys. The key of a chunk is the sha256 of all data on which its
+numbers depend. Therefore, results of older code, texts or options are never reused.
 """
 
 from __future__ import annotations
@@ -32,8 +31,6 @@ class Manifest:
 
     Attributes:
         robots: The origin of each robot and the sha256 of its text; empty if the text could not be read.
-        samples: Number of random configurations for each robot.
-        seed: Seed of the samples.
         provenance: Versions and digests of the computing code (`urdfkin.validation.results.provenance`).
         versions: Versions in the report.
         started: Start time, ISO 8601, UTC.

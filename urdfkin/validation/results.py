@@ -62,15 +62,10 @@ class RobotReport:
 
     Attributes:
         origin: Source of the robot and its loading options.
-        name: The robot's name in the URDF.
-        verdict: The verdict.
         reason: Reason why the robot is not verified; None if it is verified.
         joints: Names of the moving joints, mimic joints included.
         frames: Names of the compared frames: every link and every joint.
         tallies: Error statistics of each quantity in each reference frame.
-        samples: Number of compared configurations.
-        seconds: Computing time.
-        portrait: Summary of the robot and the findings in its file.
         clock: Computing times of the parts; None if nothing was computed.
         error: The traceback of an unexpected error, for a bug report; None otherwise.
     """
@@ -185,10 +180,7 @@ class ValidationReport(Displayable):
     """Report of a whole run.
 
     Attributes:
-        robots: One report for each robot, in the requested order.
         asked: Number of requested robots.
-        samples: Number of random configurations for each robot.
-        seed: Seed of the samples.
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.

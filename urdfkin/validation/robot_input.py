@@ -1,8 +1,7 @@
 """Represent the robots of a validation as plain data; the digest of a robot's text identifies the robot.
 
-A robot from a file is stored as its path, so that thousands of robots take little memory. The text of the
-robot is read only when it is needed. If the text has changed since the start of the validation, reading it is
-an error.
+A robot from a file is stored as its path, so that thousands of robots take little memory. Reading a text that
+has changed since the start of the validation is an error.
 """
 
 from __future__ import annotations

@@ -151,9 +151,6 @@ class RobotSummary:
 
     Attributes:
         model: The result of `describe`; None if the robot could not be read.
-        findings: The findings in the file, as `Finding.as_dict` returns them.
-        chains: Denavit-Hartenberg tables of the robot's chains, in the standard and in the modified
-            convention.
         second_reader: The comparison with yourdfpy's tree of the same text; None: not compared.
     """
 

@@ -5,10 +5,8 @@
     DIR/judge.json                settings of the accuracy study; chunks/*/*.judged: its results
     DIR/lock                      locked by the process that writes to the store
 
-Files are written atomically, so a file is either complete or absent. The answer of a chunk is stored under
-the chunk's key and does not depend on the engine. A damaged file is reported and moved to `damaged/`, and the
-chunk of this file is computed again. A file whose name belongs to no chunk of the campaign is also reported
-and moved.
+Files are written atomically, so a file is either complete or absent. A damaged file, and a file whose name
+belongs to no chunk, is reported and moved to `damaged/`. The chunk of a damaged file is computed again.
 """
 
 from __future__ import annotations

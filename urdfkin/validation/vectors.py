@@ -1,9 +1,8 @@
 """Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
 
 The file `robots/features.toml` defines small robots with one feature of URDF each. For robots of the
-catalogue, the vectors contain the robot's name, not its URDF. The reader of `urdfkin.verify.exact` computes
-all values from the decimals of the URDF. The files depend only on these texts. Configurations are computed
-from digests of names instead of random numbers.
+catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimals of
+the URDF, and configurations from digests of names. Therefore, the files depend only on these texts.
 """
 
 from __future__ import annotations

@@ -1,13 +1,9 @@
 """Engine that runs chunks in processes of this machine; the crash of a process affects only its robot.
 
-A worker process runs one chunk after another, and ends when its parent process ends. A worker is a new Python
-interpreter that does not import the parent's main module, so a script needs no `__main__` guard. The worker
-imports nothing from the current folder.
-
-One thread distributes the chunks and receives the answers. As long as robots are waiting, each worker has its
-own robot. A worker has one chunk at a time, so a crash can be attributed to a robot. This robot is tried once
-more, alone in a process, after all other robots. With `isolate`, each robot runs alone from the start, so the
-first crash of a robot is reported as its result.
+A worker is a new Python interpreter that imports neither the parent's main module nor modules of the current
+folder, so a script needs no `__main__` guard. A worker has one chunk at a time, so a crash can be attributed
+to a robot. This robot is tried once more, alone in a process, after all other robots. With `isolate`, each
+robot runs alone from the start, so the first crash of a robot is reported as its result.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ class Call:
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
         given: The inputs of the quantity: q, or q and v, or q, v and a.
-        also: Additional frames; they are computed after the frames in `frame` and are not returned.
+        also: Frames that are computed after the frames in `frame` and are not returned.
         options: Other arguments of the method, by name.
 
     Raises:

@@ -1,14 +1,12 @@
 """Checks of quantities that are derived from several results of an oracle.
 
-| Quantity | Results of the oracle from which it is computed |
-|---|---|
-| analytical Jacobian | rotation and Jacobian, with `urdfkin.verify.analytical_reference` |
-| relative placement | placements of both frames in the world |
-| IMU reading | acceleration, placement and velocity |
+| Quantity | Results of the oracle from which it is computed | |---|---| | analytical Jacobian | rotation and
+Jacobian, with `urdfkin.verify.analytical_reference` | | relative placement | placements of both frames in the
+world | | IMU reading | acceleration, placement and velocity |
 
-urdfkin's forward recursion includes gravity as an acceleration of the base. The check of an IMU reading
-subtracts gravity at the end, in the sensor's axes. An error of sign or order in one of these two computations
-therefore leads to a disagreement.
+urdfkin's forward recursion includes gravity as an acceleration of the base, but the check of an IMU reading
+subtracts gravity at the end, in the sensor's axes. An error of sign or order in one of them therefore leads
+to a disagreement.
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
 """Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader. This module runs in a separate process.
 
-A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory.
-A defect of a parser can crash the process. Therefore, a separate process compiles the file, and the caller's
-process receives only plain data. The request comes on standard input. Each answer is a line of JSON on
-standard output:
+A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory,
+or crash a parser. The request comes on standard input. Each answer is a line of JSON on standard output:
 
-1. the robot, compiled without its shapes
-2. the robot, compiled from the complete file
-3. the placements of the bodies by Pinocchio's reader
+1. the robot, compiled without its shapes 2. the robot, compiled from the complete file 3. the placements of
+the bodies by Pinocchio's reader
 
 If the process ends early, the answers that it has already written remain valid.
 """

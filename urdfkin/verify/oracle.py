@@ -499,8 +499,7 @@ class OracleQuery:
         frame: Name of a frame, or several names.
         reference: A `Reference` or its name.
         base: Motion of the base; None: fixed at the world origin.
-        inputs: q, or q and v, or q, v and a, as arrays of numbers. Their batch shapes can differ (NumPy
-            broadcasting).
+        inputs: q, or q and v, or q, v and a, as arrays of numbers that can be broadcast.
         named: Original argument of each input, if this argument contains names; otherwise None.
         joints: Name and number of joint velocities of each joint with coordinates, in order.
     """
@@ -696,19 +695,14 @@ class Oracle:
 
 
 def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray, nv: int) -> FloatArray:
-    """Return the product J_full G, the Jacobian columns for urdfkin's joint velocities v.
+    """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
     For large batches, a compiled kernel reads all Jacobians from memory only once; NumPy would read them once
     for each column. With NumPy, adding the columns would take longer than Pinocchio's computation of the
     Jacobians. The kernel and NumPy return equal numbers.
 
-    Args:
-        full: (..., Pinocchio's nv) columns for all joints.
-        columns: Indices of the columns of J_full that the function adds, in the order of the additions.
-        index: (Pinocchio's nv,) index in v for each column of J_full.
-        factor: (Pinocchio's nv,) factor of each column of J_full. These factors are the nonzero elements of
-            G.
-        nv: Length of v.
+    The columns of J_full are added in the order of `columns`. For each column of J_full, `index` is an index
+    in v, and `factor` is the nonzero element of G.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:

@@ -139,18 +139,17 @@ def build_model(
     lock: Mapping[str, float] = MappingProxyType({}),
     coupled: bool = True,
 ) -> Any:
-    """Return Pinocchio's model of a URDF text.
+    """Return Pinocchio's model of a URDF text, whose size urdfkin's tree gives.
 
     A robot that needs too much memory is rejected. A robot with a long chain of links is parsed with a larger
     stack. Otherwise such robots would crash the process.
 
     Args:
         text: The URDF text.
-        tree: urdfkin's tree of the text, which gives the size of the robot.
+        tree: urdfkin's tree of the text.
         root_joint: "floating" or "planar" to connect the root to the world by such a joint.
         mimic: True: the mimic joints move by their mimic rules. False: they are independent joints.
-        lock: Value (rad or m) of each locked joint. Pinocchio's `buildReducedModel` removes the locked joints
-            from the model.
+        lock: Value (rad or m) of each locked joint, which `buildReducedModel` removes from the model.
         coupled: Whether a locked joint locks its mimic joints too.
 
     Raises:

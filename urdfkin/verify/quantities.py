@@ -1,10 +1,7 @@
 """The table of quantities: names, shapes, functions for computation and checks, bounds and help texts.
 
-Many parts of urdfkin use this table, for example the methods of `Robot`, the checks, reports and the command
-line. To add a quantity, add a row to this table. Then write the functions that the row names, and a page in
-docs.
-
-Functions are given by name and imported at first use, so that `--help` does not import NumPy.
+The methods of `Robot`, the checks, reports and the command line use this table. Functions are given by name
+and imported at first use, so that `--help` does not import NumPy.
 
 >>> for quantity in recursive_quantities():
 ...     print(quantity.name, quantity.inputs, quantity.shape)

@@ -3,14 +3,9 @@
 Pinocchio checks the computed results. This module checks the data of the robot itself: links, joint kinds,
 origins, axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-Two faults of yourdfpy (0.0.60) with respect to the URDF specification are known. The report names these known
-faults and does not count them as differences:
-
-- The reader yourdfpy ignores the attribute `quat_xyzw` of an origin.
-- The reader yourdfpy does not normalise axes.
-
-If a number is missing in the URDF, yourdfpy returns None. Before the comparison, urdfkin replaces this None
-by the default value from the URDF specification.
+Two faults of yourdfpy (0.0.60) with respect to the URDF specification are named and do not count as
+differences: yourdfpy ignores the attribute `quat_xyzw` of an origin, and does not normalise axes. yourdfpy
+returns None for a missing number, which then counts as the default value of the specification.
 """
 
 from __future__ import annotations

@@ -1,12 +1,10 @@
 """Program that reads a USD stage in a separate process, with urdfkin's reader and with OpenUSD's own.
 
-A defect of OpenUSD's parsers, which are written in C++, can crash the process. A stage can require any amount
-of time and memory. The caller's process receives only plain data. The request comes on standard input. The
-answer is a line of JSON on standard output.
+A stage can require any amount of time and memory, or crash OpenUSD's parsers, which are written in C++. The
+request and the answer are JSON on standard input and standard output.
 
-OpenUSD contains a second reader of the joints: the parser of its package UsdPhysics. This parser resolves
-bodies, joint frames and limits with other code than `urdfkin.urdf.usd`. The answer contains the numbers of
-both readers.
+The parser of OpenUSD's package UsdPhysics resolves bodies, joint frames and limits with other code than
+`urdfkin.urdf.usd`. The answer contains the numbers of both readers.
 """
 
 from __future__ import annotations

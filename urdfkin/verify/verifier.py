@@ -76,8 +76,7 @@ class Verifier:
     Args:
         text: The URDF text that Pinocchio reads.
         tree: urdfkin's tree of the same text.
-        origin: The arguments of `load`. Error messages contain a command that loads the robot with these
-            arguments and repeats a failed computation.
+        origin: The arguments of `load`, for commands in error messages that repeat a failed computation.
         policy: Default of `verify` in calls.
         mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
         unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
@@ -86,8 +85,7 @@ class Verifier:
 
     Attributes:
         ledger: Record of checked and unchecked results.
-        reading: Result of the check of the conversion to URDF, if the robot was read from another format.
-            Empty for a URDF.
+        reading: Result of the check of the conversion to URDF from another format; empty for a URDF.
     """
 
     def __init__(

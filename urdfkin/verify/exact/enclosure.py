@@ -47,14 +47,9 @@ _ENDS = np.vectorize(ends, otypes=[float, float])
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosure:
-    """A lower and an upper bound of the true value of each number in a result, for example in a Jacobian.
+    """Bounds of the true value of each number in a result, in the shape of the result of the `Robot` method.
 
-    Attributes:
-        quantity: Name of the quantity.
-        lower: Lower bounds, in the shape of the result that the method of `Robot` returns.
-        upper: Upper bounds, in the same shape.
-        urdfkin: urdfkin's result.
-        pinocchio: Pinocchio's result; None if Pinocchio cannot compute it.
+    `pinocchio` is None if Pinocchio cannot compute the result.
     """
 
     quantity: str
@@ -105,17 +100,8 @@ class Enclosure:
 class Enclosures:
     """Intervals that contain the true placement, velocity, acceleration and Jacobians of a frame.
 
-    Attributes:
-        frame: Name of the frame.
-        reference: Reference frame of velocity, acceleration and Jacobians.
-        digits: Number of decimal digits of the interval arithmetic. The ends of the resulting intervals are
-            rounded outward to doubles.
-        placement: (4, 4) m.
-        velocity: (6,) [linear; angular], m/s, rad/s.
-        acceleration: (6,) [linear; angular], classical, m/s^2, rad/s^2.
-        jacobian: (6, nv).
-        jacobian_rate: (6, nv).
-        hessian: (6, nv, nv); None if not requested.
+    The quantities have the shapes and units of the results of `Robot`. `digits` is the number of decimal
+    digits of the interval arithmetic. The ends of the resulting intervals are rounded outward to doubles.
     """
 
     frame: str
