@@ -82,8 +82,6 @@ Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
 class Search:
-    """Search over the common variables of two aligned robots."""
-
     def __init__(
         self, robots: tuple[Robot, Robot], found: Alignment, variables: Variables, seed: int = 0
     ) -> None:

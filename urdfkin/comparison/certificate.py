@@ -240,7 +240,6 @@ _TAKEN_OVER = (
 
 
 def words_of(entry: DifferenceEntry) -> str:
-    """Return a difference of two models as one line of text."""
     a, b = (
         Mimic(**x) if isinstance(x, dict) else tuple(x) if isinstance(x, list) else x
         for x in (entry["a"], entry["b"])
@@ -314,16 +313,12 @@ def _statement_errors(document: Certificate, comparator: Comparator, said: Samen
     again = certificate(said)
     wrong = {_place(one): one for one in again["differences"]}
     claimed = {_place(one): one for one in document["differences"]}
-    yield from (
-        f"`differences`: this difference is missing: {words_of(wrong[at])}"
-        for at in wrong
-        if at not in claimed
-    )
-    yield from (
-        f"`differences`: this is not a difference: {words_of(claimed[at])}"
-        for at in claimed
-        if at not in wrong
-    )
+    for at, one in wrong.items():
+        if at not in claimed:
+            yield f"`differences`: this difference is missing: {words_of(one)}"
+    for at, one in claimed.items():
+        if at not in wrong:
+            yield f"`differences`: this is not a difference: {words_of(one)}"
     if len(claimed) < len(document["differences"]):
         yield "`differences`: an entry is listed twice"
     for at, one in claimed.items():

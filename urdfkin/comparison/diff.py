@@ -68,7 +68,6 @@ class Change:
 
     @property
     def moves(self) -> bool:
-        """Whether the change can affect the motion of links."""
         if self.element.startswith("link "):
             return self.what in _MOVING_LINKS
         if self.element == "robot":
@@ -134,7 +133,6 @@ class Changes:
     rounding: tuple[float, float] | None = None
 
     def __bool__(self) -> bool:
-        """Whether anything changed."""
         return bool(self.changes)
 
     @property
@@ -182,7 +180,6 @@ def _format(robot: Robot) -> str:
 
 
 def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
-    """Return the differences that `same` finds."""
     found = same(old, new, bounds=effects)
     changes = tuple(_changes_of(found, (_format(old), _format(new))))
     moving = [one.element for one in changes if one.moves and one.element != "robot"]

@@ -80,11 +80,9 @@ class LibraryReading:
 
     @property
     def agrees(self) -> bool:
-        """Whether the library reads the file and all poses agree."""
         return self.refused is None and not self.differences and self.worst == 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
         return asdict(self)
 
 
@@ -222,7 +220,6 @@ def _without_shapes(text: str) -> str:
 
 
 def _elements(text: str) -> dict[str, Any]:
-    """Return the URDF element of each joint."""
     try:
         return {joint.get("name", ""): joint for joint in plain_xml(text).iterfind("joint")}
     except ExpatError:

@@ -499,7 +499,24 @@ class Sameness(Displayable):
         >>> found.to_b([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]).round(6).tolist()
         [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
         """
-        return _mapped(self.trees, {one.a: one for one in self.joints}, checked(self.trees[0], q, "q"))
+        (tree_a, tree_b), joints = self.trees, {one.a: one for one in self.joints}
+        q = checked(tree_a, q, "q")
+        out = np.broadcast_to(neutral(tree_b), (*q.shape[:-1], tree_b.nq)).copy()
+        for i, joint in enumerate(tree_a.joints):
+            if (one := joints.get(joint.name)) is None:
+                continue
+            j = tree_b.joint_index(one.b)
+            theirs = tree_b.joints[j]
+            if theirs.mimic is not None or joint.kind.nq != theirs.kind.nq:
+                continue
+            at_a, at_b, n = tree_a.q_index[i], tree_b.q_index[j], joint.kind.nq
+            own = q[..., at_a : at_a + n]
+            if one.conversion is not None:
+                own = one.conversion(joint.kind, own)
+            if joint.mimic is not None:
+                own = joint.mimic.multiplier * own + joint.mimic.offset
+            out[..., at_b : at_b + n] = own if n != 1 else one.sense * own + one.offset
+        return out
 
     def convention(self) -> Convention:
         """Return a convention for A with the names, order, senses and zero offsets of B's joints.
@@ -554,29 +571,6 @@ class Sameness(Displayable):
         )
         Conversion(tree_a, "", found)  # raises an error if B has no coordinate for a joint of A
         return found
-
-
-def _mapped(
-    trees: tuple[KinematicTree, KinematicTree], joints: dict[str, JointMap], q: FloatArray
-) -> FloatArray:
-    tree_a, tree_b = trees
-    out = np.broadcast_to(neutral(tree_b), (*q.shape[:-1], tree_b.nq)).copy()
-    for i, joint in enumerate(tree_a.joints):
-        one = joints.get(joint.name)
-        if one is None:
-            continue
-        j = tree_b.joint_index(one.b)
-        theirs = tree_b.joints[j]
-        if theirs.mimic is not None or joint.kind.nq != theirs.kind.nq:
-            continue
-        at_a, at_b, n = tree_a.q_index[i], tree_b.q_index[j], joint.kind.nq
-        own = q[..., at_a : at_a + n]
-        if one.conversion is not None:
-            own = one.conversion(joint.kind, own)
-        if joint.mimic is not None:
-            own = joint.mimic.multiplier * own + joint.mimic.offset
-        out[..., at_b : at_b + n] = own if n != 1 else one.sense * own + one.offset
-    return out
 
 
 def length(metres: float) -> str:

@@ -69,7 +69,6 @@ import numpy as np
 from urdfkin.comparison.result import JointDifference, angle, length
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
-    Mechanism,
     Screw,
     Step,
     Tolerance,
@@ -267,8 +266,3 @@ class JointComparison:
             if abs(x - y) > share * size + self.tolerance.angle * max(1.0, size):
                 explained = f"{share * size:.2g}" if share else ""
                 yield JointDifference(place, f"mimic {what}", x, y, explained)
-
-
-def _body_before(mechanism: Mechanism, joint: int) -> int:
-    """Return the body that carries a joint; 0 is the root body."""
-    return mechanism.body_of[mechanism.tree.joints[joint].parent]

@@ -136,8 +136,6 @@ class _Compared(NamedTuple):
 
 
 class _Work:
-    """A batch of samples, with the inputs for urdfkin, Pinocchio and the computation with 50 digits."""
-
     def __init__(self, robot: Robot, x: Samples, base: BaseMotion | None) -> None:
         if base is not None and base.batch_shape not in ((), (len(x.q),)):
             raise InputError(
@@ -227,7 +225,6 @@ def _columns(J: NDArray[Any], which: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def _one(base: BaseNumbers, k: int) -> BaseNumbers:
-    """Return the base motion of one sample."""
     return BaseRows(base.placement[k], base.velocity[k], base.acceleration[k])
 
 

@@ -42,8 +42,6 @@ class StudySettings:
 
 
 class AccuracyResult:
-    """The accuracy results in a store."""
-
     def __init__(self, store: Store, settings: StudySettings) -> None:
         self._store, self._settings = store, settings
 
@@ -78,7 +76,6 @@ class AccuracyResult:
         self._store.write(JUDGE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
     def found(self, robot: int) -> Judgement | NotJudged | None:
-        """Return the result of a robot; None if the store has none."""
         return self._store.kept(self._key(robot), JUDGED, _read)
 
     def has(self, robot: int) -> bool:

@@ -241,8 +241,6 @@ def _kernels_pay(samples: int) -> bool:
 
 @dataclass
 class _Campaign:
-    """The chunks of a run: the known answers and the missing chunks."""
-
     subjects: Sequence[RobotInput]
     cut: Cut
     seed: int

@@ -66,7 +66,6 @@ class ResultCollector:
         self._chunks_done = self._from_earlier = self._robots_done = self._failures = 0
 
     def begin(self) -> None:
-        """Report the progress at the start of the work."""
         if self._progress is not None:
             self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
 
@@ -107,7 +106,6 @@ class ResultCollector:
                 yield index
 
     def give_up(self, found: Failure) -> None:
-        """Record a failure for every robot that is not complete."""
         for robot in self._robots:
             if not robot.over:
                 robot.failures[len(self._cut)] = found

@@ -122,8 +122,6 @@ class Engine(Protocol):
 
 
 class SerialEngine:
-    """Engine that runs one chunk after another in this process."""
-
     def run(self, work: Work, enter: Enter) -> None:
         for tasks in work:
             for task in tasks:

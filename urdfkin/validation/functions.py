@@ -615,7 +615,6 @@ class _Total:
         self.by_row, self.by_column = np.zeros(len(self.row_names)), np.zeros(len(self.column_names))
 
     def error(self, sample: int, message: str, configurations: int) -> None:
-        """Record an exception or a wrong shape."""
         self.errors += configurations
         if len(self.first_errors) < _KEPT:
             self.first_errors.append(FunctionError(sample, message))

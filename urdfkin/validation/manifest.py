@@ -58,7 +58,6 @@ class Manifest:
         return [RobotInput(origin.source, origin, stamp) for origin, stamp in self.robots]
 
     def key(self, robot: int, index: int) -> str:
-        """Return the key of a chunk."""
         return hashlib.sha256(f"{self._keys[robot]} {index} of {len(self.cut)}".encode()).hexdigest()
 
     @cached_property

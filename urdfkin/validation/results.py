@@ -113,7 +113,6 @@ class RobotReport:
         return None if case is None else replay(self.origin, quantity, reference, case)
 
     def as_dict(self, judgement: Judgement | None = None) -> dict[str, Any]:
-        """Return the robot's part of the JSON document."""
         return {
             "source": self.source,
             "name": self.name,
@@ -167,7 +166,6 @@ class RobotReport:
 
 
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
-    """Return the command that computes a case again."""
     row = QUANTITIES[quantity]
     # The prefix "joint:" is needed because a link may have the same name.
     frame = case.frame if row.of == "frames" else f"joint:{case.frame}"

@@ -169,7 +169,6 @@ def _subject(
 
 
 def _called(robot: Given) -> str:
-    """Return the name of a robot that cannot be read."""
     if isinstance(robot, str | os.PathLike):
         return str(robot) if isinstance(robot, str) else as_word(Path(robot))
     return f"<{type(robot).__name__}>"

@@ -420,7 +420,6 @@ class _Names:
         raise OracleError("the robot has no coordinate with this name", found=repr(name[:60]))
 
     def pairs(self, text: str) -> list[tuple[str, str]]:
-        """Return the pairs (name, number) of a text with `NAME=NUMBER`."""
         plain = " ".join(text.split())
         plain = plain[1:-1].strip() if plain[:1] + plain[-1:] in ("[]", "()", "{}") else plain
         names = [
@@ -434,7 +433,6 @@ class _Names:
 
 
 def _number(text: str) -> float:
-    """Return the number in SI units."""
     found = parse_quantity(text)
     value = parse_float(text) if found is None else found.value
     if value is None:
@@ -478,17 +476,14 @@ class QueryBatch(NamedTuple):
 
     @property
     def q(self) -> FloatArray:
-        """Configurations (n, nq)."""
         return self.inputs[0]
 
     @property
     def v(self) -> FloatArray:
-        """Joint velocities (n, nv)."""
         return self.inputs[1]
 
     @property
     def a(self) -> FloatArray:
-        """Joint accelerations (n, nv)."""
         return self.inputs[2]
 
 
@@ -540,7 +535,6 @@ class OracleQuery:
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Batch shape of the result."""
         axes = [x.shape[:-1] for x in self._inputs]
         if self.base is not None:
             axes += [self.base.placement.shape[:-2], self.base.velocity.shape[:-1]]

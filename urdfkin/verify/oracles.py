@@ -88,7 +88,6 @@ def version(package: str) -> str:
 
 
 def versions(oracles: Iterable[str | None] = ()) -> dict[str, str]:
-    """Return the versions of urdfkin, its libraries and all oracles."""
     packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
     packages += sorted({ORACLES[name].package for name in oracles if name in ORACLES})
     found = {package: version(package) for package in packages}

@@ -84,7 +84,6 @@ def version() -> str:
 
 
 def _impostor(found: Any) -> InstallationError:
-    """Return the error for another project under Pinocchio's name."""
     file = found.__file__ or next(iter(found.__path__), "a folder without modules")
     owner = _owner(Path(file))
     cure = f"pip uninstall {owner[0]}" if owner else f"rename or remove {file}"
@@ -252,13 +251,11 @@ class PinocchioOracle(Oracle):
         )
 
     def _ids(self, x: QueryBatch) -> list[int]:
-        """Return Pinocchio's indices of the frames or joints."""
         if x.joints:
             return [self._joint_ids[name.partition(":")[2]] for name in x.frames]
         return [self._index[self._frames.index(name)] for name in x.frames]
 
     def _reference(self, reference: Reference | str) -> Any:
-        """Return Pinocchio's ReferenceFrame of a reference or its name."""
         name = reference.name if isinstance(reference, Reference) else str(reference).upper()
         return self._pin.ReferenceFrame.names[name]
 

@@ -39,8 +39,6 @@ Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
 def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], Any]:
-    """Return a function that calls the method `name` of an oracle with a query."""
-
     def ask(oracle: Any, x: QueryBatch) -> Any:
         return getattr(oracle, name)(x)
 
@@ -125,7 +123,6 @@ class Quantity:
 
     @property
     def columns(self) -> bool:
-        """True if the quantity has a column for each joint velocity."""
         return "nv" in self.shape
 
     @property
@@ -358,7 +355,6 @@ def recursive_quantities(of: str = "frames") -> list[Quantity]:
 
 
 def validated(of: str = "frames") -> list[Quantity]:
-    """Return the quantities that a validation compares."""
     return [row for row in recursive_quantities(of) if row.validated]
 
 

@@ -139,8 +139,6 @@ def explain(
 
 
 class _Explanation:
-    """The reasons for the loss of rank of some rows of one matrix."""
-
     def __init__(self, columns: FrameColumns, sample: tuple[int, ...], rows: slice, rank: int) -> None:
         J, error = columns.J[sample], columns.error[sample]
         chosen = np.zeros(6, dtype=bool)

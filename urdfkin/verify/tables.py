@@ -157,8 +157,6 @@ def _loss(table: DHTable) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Apart:
-    """Differences between a table and Pinocchio in position, angle, Jacobian and acceleration."""
-
     metres: FloatArray
     radians: FloatArray
     jacobian: FloatArray

@@ -252,7 +252,6 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
 
 
 def _largest(joint: Joint) -> float:
-    """Return the largest absolute value (rad or m) that a joint's limits allow."""
     return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
 
 

@@ -417,7 +417,6 @@ def _demand_all(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) 
 def oracle_results_with_bound(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary = PINOCCHIO
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's results (n, frames, ...) for some configurations, and the bound."""
     if quantity.against is not None:
         return quantity.against(oracle, x, ours, by)
     return oracle_results(quantity, oracle, x.query), bound_of(quantity, x, by)
