@@ -397,7 +397,7 @@ def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) ->
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in gauge.orders:
         if not b.may_be_taken(names, comparator.tolerance):
-            return f"`orders`: the axes do not allow {', '.join(names)}"
+            return f"`orders`: the axes do not allow the order {', '.join(names)}"
         b = b.in_order(names)
     return None
 

@@ -198,12 +198,13 @@ def _source(robot: Robot) -> tuple[str, str]:
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
             raise InputError(
-                "other libraries read the whole USD stage", remedy="load it without variants and articulation"
+                "other libraries read the whole USD stage",
+                remedy="load the stage without variants and articulation",
             )
         return str(source), "usd"
     if is_mjcf(source):
         if is_text(source):
-            raise InputError("a text of MJCF cannot be given to other libraries", remedy="write it to a file")
+            raise InputError("other libraries read MJCF only from a file", remedy="write the text to a file")
         return str(source), "mjcf"
     return _without_shapes(robot.urdf), "urdf"
 

@@ -248,7 +248,7 @@ class Tool:
 #: "not asked" means that the user requested no check.
 #: "not verified" means that Pinocchio could not confirm the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
-_WORDS = {"not asked": "not asked of Pinocchio", "not verified": "not verified by Pinocchio"}
+_WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,7 +183,7 @@ def lost(what: str, error: Exception) -> Failure:
 
 #: Reasons in the report for a robot that crashed its process.
 DIED = "the process that validated the robot crashed"
-DIED_TWICE = "the process that validated the robot crashed twice; the second time it computed nothing else"
+DIED_TWICE = "the process that validated the robot crashed twice; the second process computed nothing else"
 
 
 def died(subject: RobotInput, how: str, cause: str) -> Failure:

@@ -198,12 +198,14 @@ class FunctionCheck(Displayable):
         if self.compared:
             parts.append(
                 f"Largest difference from urdfkin: {self.eps_scale:.3g} eps*scale, {self.share:.3g} of the"
-                f" bound times {self.factor:g}."
+                f" allowed difference (the bound times {self.factor:g})."
             )
         if self.oracle_share is None:
             parts.append("urdfkin's results were NOT checked: no oracle can check this robot.")
         elif self.compared:
-            parts.append(f"Largest difference from {self.oracle}: {self.oracle_share:.3g} of the same bound.")
+            parts.append(
+                f"Largest difference from {self.oracle}: {self.oracle_share:.3g} of the allowed difference."
+            )
         if self.errors:
             parts.append(f"{self.errors} configurations without a result of the right shape:")
             parts += [f"  sample {error.sample}: {error.message}" for error in self.first_errors]

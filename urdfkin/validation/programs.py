@@ -139,7 +139,7 @@ class Program:
             ProgramError: the program ended, took too long, or answered with no result.
         """
         if self._failures >= _PATIENCE:
-            raise ProgramError(f"not asked: the program failed {_PATIENCE} times in a row")
+            raise ProgramError(f"not called: the program failed {_PATIENCE} times in a row")
         if self._process is None:
             self._start()
         values = {letter: x.tolist() for letter, x in zip("qva", inputs, strict=False)}

@@ -148,13 +148,14 @@ class Store:
                     taken += 1
         return taken
 
-    def demand_same(self, manifest: Manifest, where: object) -> None:
+    def demand_same(self, manifest: Manifest, where: object = None) -> None:
         """Raise InputError with the differences if a manifest describes another campaign."""
         if differences := self.manifest.differences(manifest):
+            there = "here" if where is None else f"in {where}"
             raise InputError(
                 "the store belongs to another campaign",
                 where=str(self.folder),
-                found=f"(in the store, and in {where}) {'; '.join(differences)}",
+                found=f"(in the store, and {there}) {'; '.join(differences)}",
                 remedy="use the options of the stored campaign, or another folder",
             )
 
@@ -274,7 +275,7 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
         before.forget_failures()
         store.write_manifest()
         return store
-    before.demand_same(store.manifest, "here")
+    before.demand_same(store.manifest)
     if retry_failed:
         before.forget_failures()
     return before

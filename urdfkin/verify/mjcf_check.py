@@ -163,7 +163,7 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     if coupled is not None:
         line += f", and {len(answer['rules'])} mimic rules agree ({coupled:.1%})"
     if read.not_whole is not None:
-        line += f", without shapes and inertias: with them the file does not compile: {read.not_whole}"
+        line += f"; MuJoCo compiles the file only without shapes and inertias: {read.not_whole}"
     return f"{line}; {_pinocchios(read, ours, bound)}"
 
 

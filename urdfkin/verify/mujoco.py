@@ -154,7 +154,7 @@ class MujocoOracle(Oracle):
         for tag, names in (("origin", ("xyz", "rpy")), ("axis", ("xyz",))):
             found = None if joint.element is None else joint.element.find(tag)
             if found is not None and found.get("quat_xyzw") is not None:
-                raise OracleError("MuJoCo does not know quat_xyzw", where=f"joint {joint.name}")
+                raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
         if kind == "prismatic":  # MuJoCo requires limits, although its kinematics ignores them
@@ -403,7 +403,7 @@ def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]
     for element in robot.iterfind("joint"):
         parent, child = (element.find(tag) for tag in ("parent", "child"))
         if parent is None or child is None:
-            raise ValueError(f"joint {element.get('name')} has no ends")
+            raise ValueError(f"joint {element.get('name')} has no parent or child link")
         words = (
             element.get("name", ""),
             element.get("type", ""),

@@ -303,10 +303,15 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
     moved = (
         int(np.count_nonzero(np.abs(q) > 0.0)) if not any(joint.kind.nq > 1 for joint in tree.joints) else 0
     )
-    where = f"at the stage's configuration, with {moved} joints off zero" if moved else "at q = 0"
+    where = (
+        f"at the stage's configuration, with {moved} joint{'s' * (moved > 1)} not at zero"
+        if moved
+        else "at q = 0"
+    )
     if remarks:
-        words = f"by UsdGeom's transforms {len(remarks)} of the {len(prims)} prims are elsewhere, by up to"
-        words = f"{words} {worst[0]:.3g} m"
+        words = (
+            f"UsdGeom places {len(remarks)} of the {len(prims)} prims elsewhere, by up to {worst[0]:.3g} m"
+        )
         # Only the first difference counts, because an error of one body moves all bodies after it.
         return words, tuple(remarks[:1])
     return (

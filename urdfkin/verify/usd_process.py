@@ -115,12 +115,8 @@ def _freedoms(physics: Any, one: Any) -> str:
         if isinstance(one, kind):
             return f"{word}{str(one.axis).rpartition('.')[2][-1].upper()}"
     if isinstance(one, physics.D6JointDesc):
-        names = {"Trans": "trans", "Rot": "rot"}
-        locked = set()
-        for pair in one.jointLimits:
-            word = str(pair.first).rpartition(".")[2]
-            if pair.second.lower > pair.second.upper:
-                locked.add(next(names[k] + word[len(k) :] for k in names if word.startswith(k)))
+        ranges = [(str(pair.first).rpartition(".")[2], pair.second) for pair in one.jointLimits]
+        locked = {word[0].lower() + word[1:] for word, ends in ranges if ends.lower > ends.upper}
         return " ".join(
             freedom
             for freedom in ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")

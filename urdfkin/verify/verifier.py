@@ -335,7 +335,8 @@ class Verifier:
         check = check_table(self.oracle(), self.tree, table, drawn)
         if not check.agrees:
             raise TableError(
-                f"the {table.convention} table of {table.base_frame} to {table.tip_frame} disagrees",
+                f"the {table.convention} table of {table.base_frame} to {table.tip_frame}"
+                " disagrees with Pinocchio",
                 where=f"{self.tree.name}, Pinocchio {version()}",
                 found=str(check),
                 remedy="please report this as an error of urdfkin, with the URDF",

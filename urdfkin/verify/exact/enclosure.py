@@ -87,10 +87,11 @@ class Enclosure:
         return x
 
     def __str__(self) -> str:
-        sides = {"urdfkin's": self.urdfkin, "Pinocchio's": self.pinocchio}
-        inside = [f"{self.contains(x).sum()} of {name}" for name, x in sides.items() if x is not None]
-        widest = self.width.max(initial=0.0)
-        return f"{self.quantity}: {self.lower.size} numbers, widest {widest:.1e}, inside {', '.join(inside)}"
+        inside = f"{self.contains(self.urdfkin).sum()} numbers of urdfkin"
+        if self.pinocchio is not None:
+            inside += f", {self.contains(self.pinocchio).sum()} of Pinocchio"
+        width = self.width.max(initial=0.0)
+        return f"{self.quantity}: {self.lower.size} intervals, at most {width:.1e} wide; inside: {inside}"
 
     def __repr__(self) -> str:
         return f"<Enclosure {self}>"
