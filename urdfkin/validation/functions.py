@@ -308,7 +308,9 @@ def verify_function(
     row = quantity_of(quantity)
     if row.of != "frames" or row is ACCELERATION_BREAKDOWN:
         raise InputError("a function cannot be compared with this quantity", found=quantity)
-    how = _How(
+    run = _Run(
+        function,
+        robot,
         row,
         frame or robot.tip_frame,
         None if not row.referred else Reference.of(reference),
@@ -318,22 +320,10 @@ def verify_function(
         as_bool(batch, "batch"),
         options,
     )
-    if not how.factor > 0.0:
+    if not run.factor > 0.0:
         raise InputError("factor must be positive", found=safe_repr(factor))
-    conversion = None if convention is None else robot.convention(convention)
-    return _Run(function, robot, conversion, how).check()
-
-
-@dataclass(frozen=True)
-class _How:
-    row: Quantity
-    frame: str
-    reference: Reference | None
-    samples: int
-    seed: int
-    factor: float
-    batch: bool
-    options: dict[str, Any]
+    run.conversion = None if convention is None else robot.convention(convention)
+    return run.check()
 
 
 @dataclass
@@ -371,20 +361,30 @@ class _Compared:
         return np.where(np.isfinite(units), units, np.inf)
 
 
+@dataclass
 class _Run:
-    def __init__(
-        self, function: Callable[..., object], robot: Robot, conversion: Conversion | None, how: _How
-    ) -> None:
-        self.function, self.robot, self.conversion, self.how = function, robot, conversion, how
-        self.recorder = _Recorder(robot.verifier)
-        self.recording = copy(robot)
+    """One check of a function; the attributes are the arguments of `verify_function`, validated."""
+
+    function: Callable[..., object]
+    robot: Robot
+    row: Quantity
+    frame: str
+    reference: Reference | None
+    samples: int
+    seed: int
+    factor: float
+    batch: bool
+    options: dict[str, Any]
+    conversion: Conversion | None = None
+
+    def __post_init__(self) -> None:
+        self.recorder, self.recording = _Recorder(self.robot.verifier), copy(self.robot)
         self.recording.verifier = cast("Verifier", self.recorder)
-        self.nv = robot.nv if conversion is None else conversion.nv
 
     def check(self) -> FunctionCheck:
-        row, how, robot = self.how.row, self.how, self.robot
-        drawn = draw(robot.tree, how.samples, np.random.default_rng(how.seed), with_special=True)
-        total = _Total(row, how.factor, self._row_names(), self._column_names())
+        robot = self.robot
+        drawn = draw(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
+        total = _Total(self.row, self.factor, self._row_names(), self._column_names())
         checked = robot.verifier.cannot(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _AT_A_TIME):
             part = slice(first, first + _AT_A_TIME)
@@ -392,7 +392,7 @@ class _Run:
         return self._result(total, len(drawn.q), checked)
 
     def _result(self, total: _Total, samples: int, checked: bool) -> FunctionCheck:
-        how, robot = self.how, self.robot
+        robot = self.robot
         diagnoses: tuple[str, ...] = ()
         if total.share > 1.0 or total.errors:
             diagnoses = tuple(self._diagnoses(total))
@@ -403,14 +403,14 @@ class _Run:
         return FunctionCheck(
             getattr(self.function, "__name__", type(self.function).__name__),
             robot.name,
-            how.row.name,
-            how.frame,
-            None if how.reference is None else how.reference.name.lower(),
+            self.row.name,
+            self.frame,
+            None if self.reference is None else self.reference.name.lower(),
             None if self.conversion is None else self.conversion.convention.name,
             robot.certificate().oracle if checked else "",
             samples,
             total.compared,
-            how.factor,
+            self.factor,
             total.eps_scale,
             total.share,
             total.oracle_share if checked else None,
@@ -434,13 +434,13 @@ class _Run:
         ours = self._ours(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # a diagnosis tries q in degrees
-            found = self._method(self.robot, ours, frame or self.how.frame, reference, verify=False)
+            found = self._method(self.robot, ours, frame or self.frame, reference, verify=False)
             return self._converted(ours, found, frame, reference)
 
     def _compared(self, first: int, drawn: tuple[FloatArray, ...], total: _Total, checked: bool) -> _Compared:
-        row = self.how.row
+        row = self.row
         ours = drawn[: len(row.inputs)]
-        result = self._method(self.recording, ours, self.how.frame, None, verify=checked)
+        result = self._method(self.recording, ours, self.frame, None, verify=checked)
         _, call, _ = self.recorder.calls[row.name]
         flat = result[:, None]
         part = call.part(slice(0, call.n))
@@ -451,12 +451,12 @@ class _Run:
         else:
             bound = bound_of(row, part)
         scale = np.broadcast_to(bound.scale, flat.shape)[:, 0]
-        k = result_k(bound, flat.shape[:2])[:, 0] * self.how.factor
+        k = result_k(bound, flat.shape[:2])[:, 0] * self.factor
         inputs: tuple[FloatArray, ...] = ours
         if self.conversion is not None:
             inputs = _tuple(self.conversion.to(*ours))
             scale = self._converted_scale(ours, scale)
-            k = k + self._rounding_of_the_conversion(ours[0]) * self.how.factor
+            k = k + self._rounding_of_the_conversion(ours[0]) * self.factor
         expected = self._converted(ours, result)
         found, good = self._called(inputs, expected.shape[1:], first, total)
         if theirs is not None:
@@ -472,12 +472,10 @@ class _Run:
         *,
         verify: bool,
     ) -> FloatArray:
-        how = self.how
-        named = (
-            {} if how.reference is None else {"reference": how.reference if reference is None else reference}
-        )
-        method = getattr(robot, how.row.method)
-        found: FloatArray = method(*ours, frame=frame, verify=verify, **named, **how.options)
+        reference = self.reference if reference is None else reference
+        named = {} if self.reference is None else {"reference": reference}
+        method = getattr(robot, self.row.method)
+        found: FloatArray = method(*ours, frame=frame, verify=verify, **named, **self.options)
         return found
 
     def _ours(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
@@ -492,17 +490,17 @@ class _Run:
     ) -> FloatArray:
         if self.conversion is None:
             return result
-        reference = self.how.reference if reference is None else reference
+        reference = self.reference if reference is None else reference
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
-        jacobian = partial(self.robot.jacobian, ours[0], frame or self.how.frame, reference, verify=False)
-        return self.conversion.result(self.how.row.name, ours, result, jacobian)
+        jacobian = partial(self.robot.jacobian, ours[0], frame or self.frame, reference, verify=False)
+        return self.conversion.result(self.row.name, ours, result, jacobian)
 
     def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Return the scale of the bound for a result after its conversion to the function's convention.
 
         Each number of the converted result is a sum of numbers in urdfkin's convention.
         """
-        conversion, name = self.conversion, self.how.row.name
+        conversion, name = self.conversion, self.row.name
         assert conversion is not None
         if name == "placement":
             return scale
@@ -529,7 +527,7 @@ class _Run:
         up to 2 eps |q|, and this matrix is a factor of each term of the result. The conversion of a base
         velocity by a matrix has at most 16 rounding errors.
         """
-        conversion, row = self.conversion, self.how.row
+        conversion, row = self.conversion, self.row
         assert conversion is not None
         if conversion.permutation is not None and conversion.rate_permutation is not None:
             return 0.0
@@ -540,7 +538,7 @@ class _Run:
     ) -> tuple[FloatArray, list[int]]:
         """Return the function's results of the right shape, and their indices."""
         n = len(inputs[0])
-        if self.how.batch:
+        if self.batch:
             array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
             return (np.zeros((0, *shape)), []) if array is None else (array, list(range(n)))
         found = dict[int, FloatArray]()
@@ -568,29 +566,30 @@ class _Run:
             yield (
                 f"rounding in {precision} precision explains all differences: they are below"
                 f" {total.eps_scale * EPS:.1g} of the terms' size;"
-                f" factor={math.ceil(total.share * self.how.factor)} accepts them"
+                f" factor={math.ceil(total.share * self.factor)} accepts them"
             )
             return
-        mistakes = Mistakes(self.robot, self.how.row, self.how.frame, self.how.reference, self.conversion)
+        mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion)
         some = slice(_DIAGNOSED)
         inputs = tuple(x[kept.good[some]] for x in kept.inputs)
         case = Diagnosis(inputs, kept.found[some], kept.expected[some], kept.scale[some], self.expected)
         yield from diagnose(mistakes, case)
 
     def _replay(self, values: tuple[FloatArray, ...]) -> str:
-        _, call, _ = self.recorder.calls[self.how.row.name]
+        _, call, _ = self.recorder.calls[self.row.name]
         one = copy(call)
         one.q, one.rates, one.shape, one.n = values[0][None], [x[None] for x in values[1:]], (1,), 1
-        return self.robot.verifier._replay(self.how.row, one, 0, self.how.frame)
+        return self.robot.verifier._replay(self.row, one, 0, self.frame)
 
     def _row_names(self) -> tuple[str, ...]:
-        row = self.how.row
+        row = self.row
         angular_first = self.conversion is not None and self.conversion.angular_first
         labels = row.labels[3:] + row.labels[:3] if angular_first and len(row.labels) == 6 else row.labels
-        return labels or tuple(f"row {k}" for k in range(row.own_shape(self.nv)[0]))
+        nv = (self.conversion or self.robot).nv
+        return labels or tuple(f"row {k}" for k in range(row.own_shape(nv)[0]))
 
     def _column_names(self) -> tuple[str, ...]:
-        if not self.how.row.columns:
+        if not self.row.columns:
             return ()
         return (self.conversion or self.robot).rate_names
 
