@@ -22,7 +22,7 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
-    """Return a line about the agreement of a chain with Pinocchio's placements; None: Pinocchio cannot check.
+    """Return a line about the agreement of a chain with Pinocchio at q (n, nq); None: Pinocchio cannot check.
 
     Pinocchio's frame of a joint is the frame of the joint's child link. In a chain that leads from the parent
     link to the child link, this frame comes after the joint's motion. In a chain that leads from the child

@@ -214,7 +214,7 @@ def singular_values(
     rows: slice = slice(None),
     columns: FrameColumns | None = None,
 ) -> SingularValues:
-    """Return the singular values of some rows of matrices (..., m, nv), with guaranteed bounds.
+    """Return the singular values of some rows of finite matrices (..., m, nv), with guaranteed bounds.
 
     `error` bounds the error of each number of J. `moving` (nv,) is False for columns that are 0 in every
     configuration. `columns` is None if the matrix is not a robot's Jacobian.

@@ -112,7 +112,7 @@ class TableCheck:
 
 
 def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> TableCheck:
-    """Compare a table of `tree` with Pinocchio's model `oracle` of the same robot."""
+    """Compare a table between two frames of `tree` with Pinocchio's model `oracle` of the same robot."""
     own_q = table.coupling.select(tree, samples.q)
     columns = list(table.coupling.v_index(tree))
     own_v, own_a = samples.v[:, columns], samples.a[:, columns]

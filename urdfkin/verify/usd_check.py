@@ -81,14 +81,12 @@ def read_usd(
     *,
     variants: Sequence[tuple[str, str]] = (),
     articulation: str | None = None,
-    check: bool = True,
     patience: float = PATIENCE,
 ) -> UsdReading:
     """Read the robot of a USD file in a process with limits on time (s) and memory.
 
     The pairs (variant set, variant) are selected. `articulation` is a path or a name; None: there is only
-    one. With `check`, OpenUSD's readers also read the stage, for `check_usd_source`. Files that the stage
-    refers to are read too.
+    one. OpenUSD's readers also read the stage and the files that it refers to, for `check_usd_source`.
 
     Raises:
         SourceError: the file cannot be read or is too large.
@@ -103,7 +101,6 @@ def read_usd(
         "name": str(path),
         "variants": [list(pair) for pair in variants],
         "articulation": articulation,
-        "check": check,
         "seconds": ceil(patience) + 1,
     }
     command = own_python(

@@ -51,27 +51,22 @@ def serve() -> None:
 
 
 def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the answer to a request; with `check`, the answer has the data of OpenUSD's readers."""
+    """Return the answer to a request, with the data of OpenUSD's readers."""
     read = read_usd(
         request["path"],
         request["name"],
         variants=[tuple(pair) for pair in request["variants"]],
         articulation=request["articulation"],
     )
-    answer: dict[str, Any] = {
+    return {
         "urdf": to_urdf(read.tree),
         "single": read.single,
         "remarks": [astuple(one) for one in read.remarks],
-        "files": read.files,
         "prims": read.prims,
+        "rest": packed(read.rest[:, :3]),
+        "rest_q": read.rest_q.tolist(),
+        "joints": _second_reading(read),
     }
-    if request["check"]:
-        answer |= {
-            "rest": packed(read.rest[:, :3]),
-            "rest_q": read.rest_q.tolist(),
-            "joints": _second_reading(read),
-        }
-    return answer
 
 
 def _second_reading(read: Usd) -> dict[str, Any]:

@@ -477,7 +477,7 @@ def checked_choice(verify: object) -> Verify:
 
 
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
-    """Yield the indices of the checked configurations in parts; `numbers` is the number of values of each.
+    """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
 
     A sample is random with a fixed seed. Every k-th configuration could be a biased sample, because batches
     are often ordered.
