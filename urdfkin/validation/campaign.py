@@ -144,7 +144,7 @@ def validate(
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if _kernels_pay(len(missing) * samples) and (isolate or any(map(_is_robot, missing))):
-                load_kernels()  # no robot's time includes a compilation in a worker
+                load_kernels()  # a compilation in a worker would count as a robot's computing time
                 begin = time.perf_counter()
             collector.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
