@@ -255,12 +255,7 @@ _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified
 class Confirmation:
     """Pinocchio's confirmation of the bounds, or the reason why there is none.
 
-    Attributes:
-        state: Whether Pinocchio confirmed the bounds. If not, the kind of reason.
-        by: Name and version of the oracle: "Pinocchio 4.1.0".
-        configurations: Number of configurations at which the oracle computed the distances.
-        metres: The largest of these distances.
-        reason: Reason why the oracle computed no distances; empty if the oracle computed distances.
+    `metres` is the largest distance that the oracle computed at a number of configurations.
     """
 
     state: ConfirmationState

@@ -141,15 +141,7 @@ def _robot(source: Robot | Source | DHTable) -> Robot:
 
 
 class Comparator:
-    """The comparison of two robots, step by step.
-
-    Args:
-        robots: A and B.
-        given: For each joint name of A, the name of the matching joint in B.
-        bounds: As in `same`.
-        boxes: As in `same`.
-        within: As in `same`.
-    """
+    """The comparison of two robots, step by step; `same` explains the arguments."""
 
     def __init__(
         self,

@@ -68,10 +68,8 @@ class Errors:
 class Line:
     """The errors of urdfkin and of Pinocchio for one quantity in one reference frame.
 
-    Attributes:
-        reference: Name of the reference frame, None for placements. For analytical Jacobians: the
-            representation of the orientation.
-        numbers: Number of compared values.
+    The reference frame of a placement is None. For analytical Jacobians, `reference` is the representation of
+    the orientation. `numbers` is the number of compared values.
     """
 
     quantity: str

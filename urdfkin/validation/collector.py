@@ -70,11 +70,7 @@ class ResultCollector:
             self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
 
     def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
-        """Add an answer, and report the progress.
-
-        `kept` is True if an earlier run computed the answer. The chunks of earlier runs are counted
-        separately.
-        """
+        """Add an answer, and report the progress; `kept` is True if an earlier run computed the answer."""
         robot = self._robots[task.robot]
         was_over, had_failed, before = robot.over, robot.has_failed, robot.done
         robot.enter(task.chunk.index, found)

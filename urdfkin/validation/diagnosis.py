@@ -117,12 +117,7 @@ Mistake = tuple[str, Callable[[], FloatArray]]
 class Mistakes:
     """The usual mistakes of a function that computes one quantity of one frame.
 
-    Attributes:
-        robot: The robot.
-        row: The quantity.
-        frame: The frame.
-        reference: The reference frame; None for a placement.
-        conversion: The function's convention; None for urdfkin's.
+    `conversion` belongs to the function's convention; None: the convention is urdfkin's.
     """
 
     robot: Robot
@@ -133,10 +128,7 @@ class Mistakes:
 
     @property
     def exchanged_halves(self) -> str:
-        """A sentence for the mistake that the linear and the angular rows are exchanged.
-
-        The sentence is empty if the quantity has no linear and angular halves.
-        """
+        """A sentence about exchanged linear and angular rows; empty for a quantity without these halves."""
         first = "linear" if self._angular_first else "angular"
         return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
 

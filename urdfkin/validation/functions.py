@@ -64,8 +64,6 @@ class WorstResult:
     Attributes:
         sample: Index of the configuration.
         inputs: q, or q and v, or q, v and a, as the function received them.
-        found: The function's result.
-        expected: urdfkin's result.
         bound: Largest allowed difference of each number.
         replay: A command or a line of Python that computes the expected result.
     """

@@ -79,10 +79,9 @@ class VerificationError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Comparison of a batch of urdfkin's results with the oracle's results.
+    """Comparison of a batch of urdfkin's results (matrices or six-vectors) with the oracle's results.
 
     Attributes:
-        results: Number of results (matrices or six-vectors).
         worst: Largest difference of two numbers, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
         index: Indices, in the array of results, of the result with the largest ratio `share`.
@@ -141,7 +140,6 @@ class Line:
     """The line of a certificate about one quantity.
 
     Attributes:
-        quantity: Name of the quantity.
         checked: Number of results that the oracle confirmed.
         worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
             scale.

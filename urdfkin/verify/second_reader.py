@@ -56,7 +56,6 @@ class SecondReading:
     """Result of the comparison with yourdfpy's tree.
 
     Attributes:
-        by: Name and version of the reader.
         joints: Number of compared joints, fixed joints included.
         differences: Differences between the trees, caused by an error of urdfkin or of yourdfpy.
         known: Differences that are known faults of yourdfpy.

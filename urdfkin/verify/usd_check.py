@@ -61,13 +61,9 @@ _TRANSFORM = 6.0 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class UsdReading:
-    """The result of reading a USD stage in a separate process, as plain data.
+    """The tree of a USD stage as a URDF text, and the answer of the process that read the stage.
 
-    Attributes:
-        urdf: The tree as a URDF text.
-        remarks: Parts of the stage that the tree does not contain, and probable mistakes.
-        path: The file.
-        answer: The process's answer.
+    The remarks are about parts of the stage that the tree does not contain, and about probable mistakes.
     """
 
     urdf: str

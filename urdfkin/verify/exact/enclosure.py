@@ -60,9 +60,9 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference `upper - lower`. The width is 0 for each number whose true value is a double.
+        """The difference `upper - lower`: 0 for each number whose true value is a double.
 
-        For all other numbers, `upper` - `lower` is at least the distance between two neighbouring doubles.
+        For all other numbers, the width is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 

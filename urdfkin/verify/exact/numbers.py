@@ -116,11 +116,7 @@ def decimal(x: Number, negligible: float) -> str | None:
 class Kind(NamedTuple):
     """Functions for one type of number, for example intervals (`BALLS`).
 
-    Attributes:
-        number: Function that converts a value to this type of number. The value is a decimal in the URDF
-            text, or the double to which a joint is locked.
-        sine_cosine: Function that returns sine and cosine of an angle.
-        root: Function that returns the square root.
+    `number` converts a decimal in the URDF text, or the double to which a joint is locked.
     """
 
     number: Callable[[str | float], Number]
@@ -198,12 +194,8 @@ _WITH_QUATERNIONS = (1, 1)
 class ExactJoint:
     """The numbers of one joint in the URDF text, not rounded to doubles.
 
-    Attributes:
-        R: Orientation of the joint frame relative to its parent.
-        p: Position of the joint frame relative to its parent, m.
-        axis: Unit axis in the joint frame.
-        multiplier: Multiplier of a mimic joint, else 1.
-        offset: Offset of a mimic joint, else 0.
+    R and p (m) are the pose of the joint frame in its parent link. A joint without a mimic rule has the
+    multiplier 1 and the offset 0.
     """
 
     R: Matrix
@@ -347,7 +339,6 @@ class _Value(NamedTuple):
         moved: |M q|.
         offset: Sum of the absolute values of the terms of C. C has one term for each mimic rule.
         error: Rounding error of the value, in eps, if a program applies the rules one after the other.
-        rules: Number of rules.
     """
 
     moved: Any
