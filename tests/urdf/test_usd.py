@@ -380,7 +380,7 @@ def test_a_stage_may_show_the_robot_in_another_configuration(read: Read) -> None
     robot = read(LINKS.replace("(2, 0, 1)", "(2, 0.75, 1)") + JOINTS)
     assert codes(robot) == {}
     robot.placement([0.0, 0.0], "lower")
-    assert "with 1 joints off zero" in str(robot.certificate().reading)
+    assert "with 1 joint not at zero" in str(robot.certificate().reading)
 
 
 def renamed(text: str) -> str:

@@ -183,7 +183,7 @@ def test_a_second_oracle_that_cannot_read_the_robot_leaves_it_unverified_and_non
     text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
     report = validate(text, samples=0, oracle="mujoco")
     assert report.exit_code == 3
-    assert "MuJoCo does not know quat_xyzw" in (report.robots[0].reason or "")
+    assert "MuJoCo does not read the attribute quat_xyzw" in (report.robots[0].reason or "")
     document = validate(arm(), samples=0).as_dict()
     assert "second_oracle" not in str(document)
     assert "mujoco" not in document["versions"]

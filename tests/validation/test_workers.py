@@ -58,7 +58,7 @@ def test_processes_change_no_number(how: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        (HOW[0], "crashed twice; the second time it computed nothing else"),
+        (HOW[0], "crashed twice; the second process computed nothing else"),
         (HOW[1], "crashed"),
         (HOW[2], "crashed"),
     ],

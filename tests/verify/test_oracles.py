@@ -235,7 +235,7 @@ def test_what_mujoco_does_not_know_is_a_reason() -> None:
     text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
     with pytest.warns(urdfkin.UrdfWarning):
         robot = urdfkin.load(text, oracle="mujoco")
-    with pytest.warns(NotVerifiedWarning, match="MuJoCo does not know quat_xyzw"):
+    with pytest.warns(NotVerifiedWarning, match="MuJoCo does not read the attribute quat_xyzw"):
         robot.placement(robot.neutral(), "tool")
     assert not robot.certificate().verified
 

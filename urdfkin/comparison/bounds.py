@@ -65,16 +65,16 @@ from urdfkin.model.tree import FloatArray, inverse, pose
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 
-#: The first number is the number of random configurations at the start of a search. The second number is the
-#: number of further configurations, in which each variable is at an end of its range.
+#: A search starts with `SAMPLES` random configurations and `CORNERS` corners.
+#: In a corner, each variable is at an end of its range.
 SAMPLES, CORNERS = 512, 128
-#: The search starts from the `STARTS` worst random configurations. For each coordinate, the search tries
-#: `ALONG` different values.
+#: The search starts from the `STARTS` worst random configurations.
+#: The search tries `ALONG` different values of each coordinate.
 STARTS, ALONG = 4, 13
-#: Frames that are searched in one batch.
+#: Number of frames in one batch of a search.
 SEARCHED_TOGETHER = 24
-#: The search has one round for each of these numbers. In a round with the number 0.1, each coordinate is
-#: varied within a tenth of its range.
+#: The search has one round for each of these numbers.
+#: In a round with the number 0.1, the search varies each coordinate within a tenth of its range.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
@@ -84,13 +84,8 @@ Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 class Search:
     """Search over the common variables of two aligned robots.
 
-    Args:
-        robots: A and B.
-        found: The alignment of the robots.
-        variables: The variables that move A and B.
-        seed: Seed of the random configurations.
-        as_written: Whether B's root stays at its pose, even if the matching begins at another link of B.
-            Otherwise, B is moved so that the link where the matching begins keeps its pose.
+    If `as_written`, B's root stays at its pose, even if the matching begins at another link of B. Otherwise,
+    B is moved so that the link where the matching begins keeps its pose.
     """
 
     def __init__(
@@ -127,11 +122,9 @@ class Search:
         )
 
     def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return configurations (n, nq) of A and of B for values (n, variables).
+        """Return configurations (n, nq) of A and of B for values `z` (n, variables).
 
-        Args:
-            z: The values of the variables.
-            moved: Whether A's planar and floating joints are random instead of neutral.
+        If `moved` is true, A's planar and floating joints are random instead of neutral.
         """
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
@@ -175,10 +168,7 @@ class Search:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the same as `poses`, but for given configurations (n, nq) of A and of B.
-
-        `computed` is the function that computes the poses of the frames.
-        """
+        """Return poses as `poses` does, at configurations (n, nq), computed by the given function."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.found.base[1]]
@@ -210,10 +200,7 @@ class Search:
         return self.at(*self.configurations(z), frames, own_results)
 
     def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Compute the distances (n, frames) at random configurations and at corners of the joint ranges.
-
-        Return the distances and the configurations.
-        """
+        """Return distances (n, frames) at random configurations and corners, and the variables' values."""
         low, high = self.ends.T
         z = self.random(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
@@ -237,12 +224,9 @@ class Search:
         return np.asarray(z[int(np.argmax(turned))])
 
     def _climb(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Maximize each frame's distance by coordinate search.
+        """Maximize each frame's distance by coordinate search, from start values (frames, starts, variables).
 
-        Args:
-            frames: The frames. Each frame is searched separately, but all searches are evaluated in one
-                batch.
-            z: (frames, starts, variables) start values.
+        Each frame is searched separately, but all searches are evaluated in one batch.
         """
         ways = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
@@ -273,18 +257,14 @@ class Search:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return distances (frames, starts, values).
-
-        The array `z` (frames, starts, values, variables) contains separate values of the variables for each
-        frame.
-        """
-        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # also for robots without variables
+        """Return distances (frames, starts, values) for values `z` (frames, starts, values, variables)."""
+        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # -1 fails for a robot without variables
         off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
         return np.asarray(off[n, :, :, n])
 
     def _variables_of(self, frame: FramePair) -> list[int]:
-        """Return the indices of the variables that move a frame in at least one model."""
+        """Return the indices of the variables that move a frame in A or in B."""
         steps = set(self.found.indices(frame.previous))
         names = {
             line.variable
@@ -418,7 +398,7 @@ def _as_free_vectors(step: Step) -> Step:
 
 
 #: Largest number of boxes that exist at a time; a box is a range for each variable.
-#: With this number, a frame takes one or two seconds of processor time.
+#: With `MOST` boxes, the bound of a frame takes one or two seconds of processor time.
 MOST = 2**17
 #: Number of boxes computed in one batch. The Jacobians of more boxes would take gigabytes of memory.
 TOGETHER = 2**16
@@ -427,12 +407,8 @@ TOGETHER = 2**16
 class Boxes:
     """Upper bounds on the distance between a frame's origin in A and in B.
 
-    A box is a range for each variable. Each bound is valid for all configurations in one box.
-
-    Args:
-        search: The search, which contains both robots.
-        frame: The frame.
-        names: Names of the variables that change the distance (`moved_together` finds them).
+    A box is a range for each variable. Each bound is valid for all configurations in one box. `names` are the
+    names of the variables that change the distance (`moved_together` finds them).
     """
 
     def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
@@ -485,17 +461,10 @@ class Boxes:
 
 
 def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
-    """Return a proven upper bound (m) on a frame's distance.
+    """Return a proven upper bound (m) on a frame's distance, with at most `most` boxes at a time.
 
-    If the search proves the bound `target`, the function returns `target`. Otherwise it returns a bound of at
-    most `upper`.
-
-    Args:
-        search: The search, which contains both robots.
-        frame: The frame.
-        target: The bound to prove.
-        upper: The bound that is proven already.
-        most: Largest number of boxes at a time.
+    If the search proves the bound `target`, the function returns `target`. Otherwise the function returns a
+    bound of at most `upper`, which is proven already.
     """
     variables = search.variables
     steps, pairs = moved_together(search.found, variables, frame)

@@ -32,11 +32,11 @@ from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Largest number of boxes in memory while a bound of a certificate is proven again.
 MOST_AGAIN = 2**22
-#: Tolerances for numbers in a certificate that was made on another machine: the relative tolerance, and the
-#: absolute tolerance (m or rad) for numbers near zero.
+#: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) near zero.
+#: Another machine, which wrote the certificate, may round differently.
 _RELATIVE, _ZERO = 1e-9, 1e-15
-#: Another machine may round sums differently. So a bound that is proven again may be larger than the bound in
-#: the certificate, by a factor of 1 + _LAST_BITS * (machine epsilon).
+#: A bound that is proven again may exceed the certificate's bound by this multiple of the machine epsilon.
+#: The reason is that another machine may round sums differently.
 _LAST_BITS = 64.0
 #: Entries that `recheck` computes again from the two models, and compares with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
@@ -216,10 +216,7 @@ SAME = Layout(
 
 
 def certificate(found: Sameness, command: str | None = None) -> Certificate:
-    """Return the certificate with the joint map, the verdict, the differences and the interval of each frame.
-
-    An entry of the certificate is null if there is no bound.
-    """
+    """Return the certificate: joint map, verdict, differences, and intervals; null: there is no bound."""
     a, b = ({"name": name, "source": source} for name, source in zip(found.names, found.sources, strict=True))
     document = {
         "schema": SAME.name,
@@ -235,7 +232,7 @@ def certificate(found: Sameness, command: str | None = None) -> Certificate:
     return cast("Certificate", plain(document))
 
 
-#: Attributes of `Sameness` that are copied to the certificate under the same names.
+#: Attributes of `Sameness` with the same name in the certificate.
 _TAKEN_OVER = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written", "checked",
@@ -243,7 +240,6 @@ _TAKEN_OVER = (
 
 
 def words_of(entry: DifferenceEntry) -> str:
-    """Return a difference of two models as one line of text."""
     a, b = (
         Mimic(**x) if isinstance(x, dict) else tuple(x) if isinstance(x, list) else x
         for x in (entry["a"], entry["b"])
@@ -253,9 +249,7 @@ def words_of(entry: DifferenceEntry) -> str:
 
 
 def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
-    """Check a certificate against two models, and return its wrong statements.
-
-    The list is empty if the certificate is right.
+    """Check a certificate against two models, and return its wrong statements; none: it is right.
 
     The certificate states which joints match, and how the coordinates of A are converted to those of B. The
     recheck uses these statements, so it needs no search. Only the verdict "differs" needs one, because
@@ -265,11 +259,6 @@ def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
     the remarks again, and compares them with the certificate. A lower bound is a distance at a configuration
     in the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound is proven
     again.
-
-    Args:
-        document: The result of `certificate`, or of `SAME.read`.
-        a: The first model.
-        b: The second model.
 
     Raises:
         InputError: the certificate was made for models with other texts, or names a joint or link that a
@@ -332,16 +321,12 @@ def _statement_errors(document: Certificate, comparator: Comparator, said: Samen
     again = certificate(said)
     wrong = {_place(one): one for one in again["differences"]}
     claimed = {_place(one): one for one in document["differences"]}
-    yield from (
-        f"`differences`: this difference is missing: {words_of(wrong[at])}"
-        for at in wrong
-        if at not in claimed
-    )
-    yield from (
-        f"`differences`: this is not a difference: {words_of(claimed[at])}"
-        for at in claimed
-        if at not in wrong
-    )
+    for at, one in wrong.items():
+        if at not in claimed:
+            yield f"`differences`: this difference is missing: {words_of(one)}"
+    for at, one in claimed.items():
+        if at not in wrong:
+            yield f"`differences`: this is not a difference: {words_of(one)}"
     if len(claimed) < len(document["differences"]):
         yield "`differences`: an entry is listed twice"
     for at, one in claimed.items():
@@ -375,10 +360,7 @@ def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: 
 def _confirmation_errors(
     claimed: Confirmed, comparator: Comparator, found: Alignment, variables: Variables
 ) -> Iterator[str]:
-    """Yield wrong statements about Pinocchio's check of the distances.
-
-    A certificate without a confirmation makes no statement about Pinocchio.
-    """
+    """Yield wrong statements about Pinocchio's check; a certificate without confirmation makes none."""
     state, reason = claimed["state"], claimed["reason"]
     if state != "confirmed" and reason and claimed == plain(Confirmation(state, reason=reason)):
         return
@@ -396,11 +378,7 @@ def _confirmation_errors(
 
 
 def _gauge(document: Certificate) -> Gauge:
-    """Return the transforms, offsets and joint orders with which a certificate aligns B with A.
-
-    The certificate states the pose of the base, the direction and the zero offset of each joint, the
-    conversions of planar and floating joints, and the order of joints.
-    """
+    """Return the transforms, offsets and joint orders with which a certificate aligns B with A."""
     joints, base = document["joints"], document["base_links"]
     return Gauge(
         (base[0], base[1]),
@@ -428,7 +406,7 @@ def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) ->
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in gauge.orders:
         if not b.may_be_taken(names, comparator.tolerance):
-            return f"`orders`: the axes do not allow {', '.join(names)}"
+            return f"`orders`: the axes do not allow the order {', '.join(names)}"
         b = b.in_order(names)
     return None
 
@@ -486,17 +464,11 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Yield the wrong statements about an interval.
+    """Yield the wrong statements about an interval: compute its lower bound again, prove the upper bounds.
 
-    The function computes the interval's lower bound again, and proves its upper bounds again.
-
-    Args:
-        search: The search for the largest distances between the two robots.
-        frame: The pair of matching frames.
-        claim: The certificate's statement about the frame.
-        rounding: (m, rad) distance and angle below which two frames are treated as equal.
-        sharply: Whether to prove an upper bound by branch and bound. This proof is slow, and it is skipped if
-            another part of the certificate is wrong.
+    Two frames are treated as equal if they differ by at most `rounding` (m, rad). If `sharply` is true, an
+    upper bound may be proven by branch and bound. This proof is slow, and the caller skips it if another part
+    of the certificate is wrong.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
@@ -519,7 +491,7 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        # If the models reach a larger distance than the claimed upper bound, the claim is wrong.
+        # A claimed upper bound is wrong if the models reach a larger distance.
         attained = max(claim["lower"], float(search.seen([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
@@ -536,9 +508,8 @@ def _not_attained(
 ) -> Iterator[str]:
     """Yield the reasons why the lower bound of an interval is wrong.
 
-    There are two possible reasons. The configurations `q_a` and `q_b` of the interval may be invalid.
-    Otherwise, urdfkin or Pinocchio computes a smaller distance or angle at `q_a` and `q_b` than the
-    certificate states.
+    Either the configurations `q_a` and `q_b` are invalid, or urdfkin or Pinocchio computes a smaller distance
+    or angle there than the certificate states.
     """
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])

@@ -1,8 +1,7 @@
 """List the changes between two versions of a robot description, and bound how far they move the frames.
 
-Two files of one format are compared attribute by attribute. Files of two formats cannot be compared attribute
-by attribute, because each format has its own attributes. For such files, the changes are the differences that
-`same` finds.
+Two files of one format are compared attribute by attribute. Each format has its own attributes, so the
+changes between files of two formats are the differences that `same` finds.
 """
 
 from __future__ import annotations
@@ -35,15 +34,15 @@ from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source, Text, is_usd
 from urdfkin.urdf.writer import to_urdf
 
-#: URDF attributes that consist of several numbers. The value lists the names of these numbers.
+#: Names of the numbers in a URDF attribute with several numbers.
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Default values of a joint's attributes, for attributes that the file omits.
+#: Values of joint attributes that a file omits.
 _DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
 _AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
-#: Attributes of a joint that affect the motion of links.
+#: Joint attributes that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: If the files have different formats, changes with these names move a link.
+#: Changes of a link that move it, if the files have different formats.
 _MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -69,7 +68,6 @@ class Change:
 
     @property
     def moves(self) -> bool:
-        """Whether the change can affect the motion of links."""
         if self.element.startswith("link "):
             return self.what in _MOVING_LINKS
         if self.element == "robot":
@@ -92,7 +90,7 @@ def word(value: Value | None) -> str:
 
 
 def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
-    """Return text about the distance by which changes move a frame, or the angle of a pure rotation."""
+    """Return words for the distance by which changes move a frame, or for the angle of a pure rotation."""
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
@@ -135,7 +133,6 @@ class Changes:
     rounding: tuple[float, float] | None = None
 
     def __bool__(self) -> bool:
-        """Whether anything changed."""
         return bool(self.changes)
 
     @property
@@ -176,14 +173,13 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
 
 
 def _format(robot: Robot) -> str:
-    """Return the format of a robot's source; for a Denavit-Hartenberg table, return the format of a URDF."""
+    """Return the format of a robot's source; a Denavit-Hartenberg table counts as URDF."""
     if is_usd(robot.source):
         return "USD"
     return "MJCF" if robot.origin.sha256 else "URDF"
 
 
 def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
-    """Run `same`, and return its differences as a `Changes`."""
     found = same(old, new, bounds=effects)
     changes = tuple(_changes_of(found, (_format(old), _format(new))))
     moving = [one.element for one in changes if one.moves and one.element != "robot"]
@@ -202,7 +198,7 @@ def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
 
 
 def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[Change]:
-    """Yield the differences of the joints first, then all other differences, then names and remarks."""
+    """Yield the differences of joints, then all other differences, then names and remarks."""
     for at in found.unexplained:
         if at.what and at.a is None:
             yield Change(at.place, at.what, None, None, str(at.b))
@@ -229,7 +225,7 @@ def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[Change]:
 
 
 def _not_compared(found: Sameness) -> Iterator[Change]:
-    """Yield the differences that `same` finds, if the models cannot be compared at each joint."""
+    """Yield the differences that `same` finds, if some joint of the models cannot be compared."""
     if found.up_to_single or (found.unexplained and all(one.what for one in found.unexplained)):
         return
     listed = {one.place for one in found.unexplained if one.what}
@@ -267,7 +263,7 @@ def _renamed(found: Sameness) -> KinematicTree:
     tree = found.trees[1]
     links = {theirs: ours for ours, theirs in found.links}
     joints = {one.b: one.a for one in found.joints}
-    for i, joint in enumerate(tree.joints):  # name a fixed joint like A's joint that carries the same link
+    for i, joint in enumerate(tree.joints):  # a fixed joint gets the name of A's joint with the same link
         link = links.get(tree.links[i + 1])
         if joint.name not in joints and link in found.trees[0].links[1:]:
             joints[joint.name] = found.trees[0].joints[found.trees[0].link_index(link) - 1].name
@@ -300,7 +296,7 @@ def _changes(old: str, new: str) -> Iterator[Change]:
 
 
 def _facts(element: Element, tag: str) -> dict[str, Value]:
-    """Return the attribute values of an element and of the element's children, by readable names."""
+    """Return the attributes of an element and its children, by names such as "origin x"."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -333,43 +329,26 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Compute the distances by which the changes of a single joint move the frames.
-
-    The function makes a copy of the old robot, in which only this joint has the values of the new robot. Then
-    `same` compares the copy with the old robot.
-
-    Args:
-        old: The tree of the old robot.
-        new: The tree of the new robot.
-        element: The changed element.
-        name: The name of the joint.
-    """
-    trees = old, new
-    if any(name not in {joint.name for joint in tree.joints} for tree in trees):
+    """Return the effect of one joint's changes: `same` compares the old robot with a changed copy."""
+    names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
+    if name not in names & new_names:
         return None
-    at, there = (tree.joint_index(name) for tree in trees)
-    ends = [
-        (tree.links[tree.joints[i].parent], tree.links[i + 1])
-        for tree, i in zip(trees, (at, there), strict=True)
-    ]
-    joint = trees[1].joints[there]
-    if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in {j.name for j in trees[0].joints}):
+    at, there = old.joint_index(name), new.joint_index(name)
+    joint = new.joints[there]
+    ends = [(tree.links[tree.joints[i].parent], tree.links[i + 1]) for tree, i in ((old, at), (new, there))]
+    if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in names):
         return None
+    joints = list(old.joints)
+    joints[at] = replace(joint, parent=joints[at].parent)
     try:
-        changed, plain = (_quietly(tree) for tree in (_with_joint(trees[0], at, joint), trees[0]))
-    except InputError:  # this copy cannot be written as a URDF, so no effect is computed
+        changed, plain = (_quietly(tree) for tree in (replace(old, joints=tuple(joints)), old))
+    except InputError:  # a URDF cannot describe this copy
         return None
     worst = same(plain, changed).worst_as_written
     return None if worst is None else Effect(element, worst)
 
 
 def _quietly(tree: KinematicTree) -> Robot:
-    """Make a robot from a tree, without warnings about the URDF that urdfkin writes for this tree."""
+    """Return a robot without warnings about the URDF that urdfkin writes for its tree."""
     text = Text(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)
-
-
-def _with_joint(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:
-    joints = list(tree.joints)
-    joints[at] = replace(joint, parent=joints[at].parent)
-    return KinematicTree(tree.name, tree.links, tuple(joints))

@@ -27,11 +27,11 @@ from urdfkin.verify.adapters import LIBRARIES, version
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Two poses count as equal if they differ by at most this number. If positions are larger than 1 m, the
-#: number is multiplied by the largest position in metres. Libraries that compute in double precision differ
-#: by less than 1e-13. A misread element causes a larger difference.
+#: Poses count as equal if their entries differ by at most `_EQUAL` * max(1, largest entry).
+#: Libraries that compute in double precision differ by less than 1e-13.
+#: A misread element causes a larger difference.
 _EQUAL = 1e-9
-#: For libraries that compute in single precision: largest difference between two poses that count as equal.
+#: The same number for libraries that compute in single precision.
 _EQUAL_SINGLE = 1e-5
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
@@ -43,14 +43,10 @@ _QUOTED = 200
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A joint that a library reads differently.
+    """A joint that a library reads differently, and the element of the file that explains the difference.
 
-    Attributes:
-        joint: Name of the joint.
-        element: Element of the file that explains the difference.
-        words: The difference in words.
-        size: Largest difference of an entry of the child link's pose in the parent link (m, or rotation
-            entry).
+    `size` is the largest difference of an entry of the child link's pose in the parent link (m, or rotation
+    entry).
     """
 
     joint: str
@@ -64,8 +60,6 @@ class LibraryReading:
     """The differences between a library and urdfkin in reading a robot file.
 
     Attributes:
-        library: Name of the library.
-        version: Version of the library.
         refused: Reason why the library does not read the file; None if it reads the file.
         joints: The joints with a coordinate in the library, in the library's order.
         same_order: Whether the library has the same joints as urdfkin, in the same order.
@@ -86,29 +80,23 @@ class LibraryReading:
 
     @property
     def agrees(self) -> bool:
-        """Whether the library reads the file and all poses agree."""
         return self.refused is None and not self.differences and self.worst == 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
         return asdict(self)
 
 
 def installed(form: str = "urdf") -> tuple[str, ...]:
-    """Return the names of the libraries of this environment that have an adapter for a format."""
+    """Return the names of the installed libraries that have an adapter for a format."""
     return tuple(name for name, one in LIBRARIES.items() if form in one.forms and version(name) is not None)
 
 
 def compare_readers(
     robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
 ) -> tuple[LibraryReading, ...]:
-    """Compare how libraries read a robot's file with how urdfkin reads it.
+    """Compare how libraries read a robot's file with how urdfkin reads it, by default all `installed` ones.
 
-    Args:
-        robot: The robot. The poses of all links are compared at q = 0 and at random configurations.
-        libraries: Names of libraries (`installed`); by default all installed libraries that read the format.
-        samples: Number of random configurations.
-        seed: Seed of the configurations.
+    The poses of all links are compared at q = 0 and at random configurations.
 
     Raises:
         UnknownNameError: a library has no adapter.
@@ -159,7 +147,7 @@ def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _reading(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Run one library in a separate process, and return how the library reads the robot."""
+    """Run one library in a separate process, and compare its poses with `ours` at `q`."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].forms:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
@@ -180,16 +168,15 @@ def _reading(
     if not shared:
         return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
     both = np.array([[one[links[i]] for i in shared] for one in theirs])
-    # The text does not contain a root joint that `load` added, so poses are compared relative to the first
-    # link that urdfkin and the library have.
+    # The text lacks a root joint that `load` added, so poses are relative to the first common link.
     both = np.linalg.inv(both[:, :1]) @ both
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(both - ours[:, shared]).max())
     poses = dict(zip(shared, both.swapaxes(0, 1), strict=True))
     elements = _elements(source) if form == "urdf" else {}
     own = [joint for joint in answer["joints"] if joint in values[0]]
-    added = next((joint.name for joint in robot.tree.joints if joint.name not in elements), None)
-    added = added if form == "urdf" else None
+    new = (joint.name for joint in robot.tree.joints if form == "urdf" and joint.name not in elements)
+    added = next(new, None)
     return LibraryReading(
         title,
         number,
@@ -211,12 +198,13 @@ def _source(robot: Robot) -> tuple[str, str]:
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
             raise InputError(
-                "other libraries read the whole USD stage", remedy="load it without variants and articulation"
+                "other libraries read the whole USD stage",
+                remedy="load the stage without variants and articulation",
             )
         return str(source), "usd"
     if is_mjcf(source):
         if is_text(source):
-            raise InputError("a text of MJCF cannot be given to other libraries", remedy="write it to a file")
+            raise InputError("other libraries read MJCF only from a file", remedy="write the text to a file")
         return str(source), "mjcf"
     return _without_shapes(robot.urdf), "urdf"
 
@@ -233,7 +221,6 @@ def _without_shapes(text: str) -> str:
 
 
 def _elements(text: str) -> dict[str, Any]:
-    """Return the URDF element of each joint."""
     try:
         return {joint.get("name", ""): joint for joint in plain_xml(text).iterfind("joint")}
     except ExpatError:
@@ -249,7 +236,7 @@ def _differences(
     own: Sequence[str],
     equal: float,
 ) -> Iterator[Difference]:
-    """Yield the joints whose child link has a different pose in the parent link."""
+    """Yield the joints with another pose of the child link in the parent link."""
     for i, joint in enumerate(robot.tree.joints, 1):
         if i not in theirs or joint.parent not in theirs:
             continue
@@ -266,8 +253,7 @@ def _explained(
 ) -> tuple[str, str]:
     """Return the element that explains a difference, and the difference in words.
 
-    `T` contains urdfkin's poses of the child link in the parent link, and `found` the library's. The first
-    pose is the pose at q = 0.
+    `T` (urdfkin) and `found` (library) are poses of the child link in the parent link, first at q = 0.
     """
     off = np.abs(T - found)
     name, words = f"type {joint.kind.value}", "has no coordinate for it"
@@ -288,7 +274,7 @@ def _explained(
 
 
 def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str:
-    """Describe how a joint's motion from q = 0 differs between urdfkin and the library."""
+    """Return words for the difference between urdfkin's and the library's motion from q = 0."""
     start = np.linalg.inv(T[0])
     mine, theirs = start @ T[1:], start @ found[1:]
     if joint.kind is JointKind.PRISMATIC:
@@ -300,20 +286,16 @@ def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str
         return "turns it the other way"
     elif np.abs(theirs[:, :3, :3] @ theirs[:, :3, :3].swapaxes(-1, -2) - np.eye(3)).max() > equal:
         return "returns a matrix that is no rotation"
-    direction = theirs[0, :3, 3]
-    if joint.kind is not JointKind.PRISMATIC:
-        S = theirs[0, :3, :3] - theirs[0, :3, :3].T
-        direction = np.array([S[2, 1], S[0, 2], S[1, 0]])
+    direction, own = (_direction(joint, T[0]) for T in (theirs, mine))
     if (length := math.hypot(*direction)) <= equal:
         return "does not move it"
-    direction = np.round(direction / length * _sense(joint, mine[0]), 6) + 0.0
-    x, y, z = (f"{number:.4g}" for number in direction)
+    sense = 1.0 if own @ joint.axis >= 0.0 else -1.0
+    x, y, z = (f"{number:.4g}" for number in np.round(direction / length * sense, 6) + 0.0)
     return f"moves it along another axis: {x} {y} {z}"
 
 
-def _sense(joint: Joint, mine: FloatArray) -> float:
-    """Return the sign of the joint's first motion about or along its axis."""
-    own = mine[:3, 3]
-    if joint.kind is not JointKind.PRISMATIC:
-        own = np.array([mine[2, 1] - mine[1, 2], mine[0, 2] - mine[2, 0], mine[1, 0] - mine[0, 1]])
-    return 1.0 if own @ joint.axis >= 0.0 else -1.0
+def _direction(joint: Joint, T: FloatArray) -> FloatArray:
+    """Return a vector along the displacement of a prismatic joint, or along the axis of a rotation."""
+    if joint.kind is JointKind.PRISMATIC:
+        return T[:3, 3]
+    return np.array([T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]])

@@ -37,9 +37,8 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
-#: `_TENTH` is the smallest number that is printed with a unit prefix, for example 0.1 mm. `_TENTH` is 0.1
-#: after rounding to four digits. Numbers of at least `_NINE` times `_TENTH` (0.9) have no prefix, for example
-#: 0.9 m.
+#: `_TENTH`, 0.1 after rounding to four digits, is the smallest number with a unit prefix: 0.1 mm.
+#: Numbers from `_NINE` * `_TENTH` have no prefix: 0.9 m.
 _TENTH, _NINE = 0.09995, 9.0
 
 
@@ -56,10 +55,11 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes that do not make two models different. Two models are equivalent if they agree after
-#: changes of these kinds. The headline of a result names the kinds in this order.
+#: Kinds of changes that do not make two models different.
+#: Two models are equivalent if they agree after changes of these kinds.
+#: The headline of a result names the kinds in this order.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
-#: Kinds of differences for which the distance between each pair of matching frames can still be bounded.
+#: Kinds of differences that leave the distances of matching frames bounded.
 BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
@@ -69,7 +69,7 @@ class Question:
 
     Attributes:
         within: Largest allowed distance between matching frames of the models as they are written, in metres
-            and in radians. If it is None, the question is whether the models are equivalent.
+            and in radians. None: the question is whether the models are equivalent.
         strict: Whether the answer is also no for models that are equivalent but not the same, and for models
             with remarks, such as different joint limits.
     """
@@ -105,8 +105,7 @@ class Interval:
     q_b: tuple[float, ...]
 
 
-#: Value of a parameter: a joint type or name, a number, the two ends of a range, several names, or a mimic
-#: rule.
+#: Value of a parameter: a type or name, a number, the ends of a range, several names, or a mimic rule.
 Value = str | float | tuple[str | float | None, ...] | Mimic | None
 
 
@@ -135,10 +134,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The parameter's values in A and in B, as numbers or words.
-
-        If a model has no value, its entry is None.
-        """
+        """The parameter's values in A and in B, as numbers or words; None: a model has no value."""
         if self.what == "limits":
             return _range(self.a), _range(self.b)
         if self.what == "idle":
@@ -147,7 +143,7 @@ class Difference:
         return a, b
 
     @property
-    def words(self) -> str:  # noqa: PLR0911, PLR0912  a line for each parameter
+    def words(self) -> str:  # noqa: PLR0911, PLR0912  each parameter has its own line
         """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
         off = [f"{length(self.metres)} off"] if self.metres else []
@@ -250,22 +246,18 @@ class Tool:
     pose: FloatArray
 
 
-#: Result of Pinocchio's check of the bounds. "not asked" means that the user requested no check. "not
-#: verified" means that Pinocchio could not confirm the bounds.
+#: Result of Pinocchio's check of the bounds.
+#: "not asked" means that the user requested no check.
+#: "not verified" means that Pinocchio could not confirm the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
-_WORDS = {"not asked": "not asked of Pinocchio", "not verified": "not verified by Pinocchio"}
+_WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
 
 
 @dataclass(frozen=True, slots=True)
 class Confirmation:
     """Pinocchio's confirmation of the bounds, or the reason why there is none.
 
-    Attributes:
-        state: Whether Pinocchio confirmed the bounds. If not, the kind of reason.
-        by: Name and version of the oracle: "Pinocchio 4.1.0".
-        configurations: Number of configurations at which the oracle computed the distances.
-        metres: The largest of these distances.
-        reason: Reason why the oracle computed no distances; empty if the oracle computed distances.
+    `metres` is the largest distance that the oracle computed at a number of configurations.
     """
 
     state: ConfirmationState
@@ -504,7 +496,24 @@ class Sameness(Displayable):
         >>> found.to_b([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]).round(6).tolist()
         [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
         """
-        return _mapped(self.trees, {one.a: one for one in self.joints}, checked(self.trees[0], q, "q"))
+        (tree_a, tree_b), joints = self.trees, {one.a: one for one in self.joints}
+        q = checked(tree_a, q, "q")
+        out = np.broadcast_to(neutral(tree_b), (*q.shape[:-1], tree_b.nq)).copy()
+        for i, joint in enumerate(tree_a.joints):
+            if (one := joints.get(joint.name)) is None:
+                continue
+            j = tree_b.joint_index(one.b)
+            theirs = tree_b.joints[j]
+            if theirs.mimic is not None or joint.kind.nq != theirs.kind.nq:
+                continue
+            at_a, at_b, n = tree_a.q_index[i], tree_b.q_index[j], joint.kind.nq
+            own = q[..., at_a : at_a + n]
+            if one.conversion is not None:
+                own = one.conversion(joint.kind, own)
+            if joint.mimic is not None:
+                own = joint.mimic.multiplier * own + joint.mimic.offset
+            out[..., at_b : at_b + n] = own if n != 1 else one.sense * own + one.offset
+        return out
 
     def convention(self) -> Convention:
         """Return a convention for A with the names, order, senses and zero offsets of B's joints.
@@ -522,7 +531,7 @@ class Sameness(Displayable):
         >>> found.convention().joints[:2]
         ('shoulder_pan_joint', 'shoulder_lift_joint')
         """
-        from urdfkin.model.conventions import Convention, Conversion, JointRule  # noqa: PLC0415  keeps same light
+        from urdfkin.model.conventions import Convention, Conversion, JointRule  # noqa: PLC0415  `same` starts faster without this import
 
         tree_a, tree_b = self.trees
         of_b = {one.b: one for one in self.joints}
@@ -559,29 +568,6 @@ class Sameness(Displayable):
         )
         Conversion(tree_a, "", found)  # raises an error if B has no coordinate for a joint of A
         return found
-
-
-def _mapped(
-    trees: tuple[KinematicTree, KinematicTree], joints: dict[str, JointMap], q: FloatArray
-) -> FloatArray:
-    tree_a, tree_b = trees
-    out = np.broadcast_to(neutral(tree_b), (*q.shape[:-1], tree_b.nq)).copy()
-    for i, joint in enumerate(tree_a.joints):
-        one = joints.get(joint.name)
-        if one is None:
-            continue
-        j = tree_b.joint_index(one.b)
-        theirs = tree_b.joints[j]
-        if theirs.mimic is not None or joint.kind.nq != theirs.kind.nq:
-            continue
-        at_a, at_b, n = tree_a.q_index[i], tree_b.q_index[j], joint.kind.nq
-        own = q[..., at_a : at_a + n]
-        if one.conversion is not None:
-            own = one.conversion(joint.kind, own)
-        if joint.mimic is not None:
-            own = joint.mimic.multiplier * own + joint.mimic.offset
-        out[..., at_b : at_b + n] = own if n != 1 else one.sense * own + one.offset
-    return out
 
 
 def length(metres: float) -> str:
@@ -626,7 +612,7 @@ def _with_prefix(value: float, unit: str) -> str:
 
 
 def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
-    """Raise UnknownNameError if a name is not the name of a joint, and InputError if a name occurs twice."""
+    """Raise UnknownNameError for a name that no joint has, and InputError for a name that occurs twice."""
     for name in names:
         tree.joint_index(name)
     if len(set(names)) < len(names):
@@ -635,15 +621,10 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 
 
 def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
-    """Return the changes that make B equal to A, including changes of end-effector frames (tools).
+    """Return the changes that make B equal to A: the kind of each (an entry of `FREE`) and a line of text.
 
-    A change consists of its kind, which is an entry of `FREE`, and a line of text.
-
-    Args:
-        found: The alignment of the models. The function sets the tool poses in this alignment.
-        rounding: The tolerance within which numbers are equal.
-        tables: Whether one model is a Denavit-Hartenberg table. The poses of a table's frames depend on the
-            table's convention. Therefore, every frame that differs is treated as a tool.
+    The function sets the tool poses in `found`. If one model is a Denavit-Hartenberg table (`tables`), every
+    frame that differs is a tool, because the poses of a table's frames depend on the table's convention.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = found.a.tree, found.b.tree
@@ -675,7 +656,7 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
 
 
 def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Yield a pair for each changed tool: the kind "tools" and a line of text.
+    """Yield the kind "tools" and a line of text for each changed tool.
 
     A frame that differs is a tool if it has no children, or if it describes how the robot is mounted.
     """
@@ -697,9 +678,8 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
 def _around(found: Alignment) -> set[tuple[int, int]]:
     """Return the matching frames of the root body that only describe how the robot is mounted.
 
-    Some of these frames are links before the first link to which a moving joint is attached. The
-    other frames are links such as a world or a table: they carry no moving joint, and they have the same pose
-    in the root frames of A and B.
+    Some of these frames are links before the first link with a moving joint. The other frames are links such
+    as a world or a table: they carry no moving joint, and have the same pose in the root frames of A and B.
     """
     if found.a.body_of[found.base[0]] or found.b.body_of[found.base[1]]:
         return set()
@@ -719,9 +699,8 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
 def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
     """Return two sets of links of the root body: links before the robot, and links beside the robot.
 
-    A link is before the robot if one of its fixed child links carries all moving joints, for example a
-    pedestal. A link is beside the robot if it carries no moving joint, for example a table. If the robot has
-    no moving joint, both sets are empty.
+    A fixed child link of a link before the robot, such as a pedestal, carries all moving joints. A link
+    beside the robot, such as a table, carries none. If the robot has no moving joint, both sets are empty.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -761,9 +740,9 @@ def _rounded(x: float, rounding: float) -> float:
 
 
 def _is_tool(found: Alignment, frame: FramePair) -> bool:
-    """Return whether a frame is fixed and has no children, in A as well as in B.
+    """Return whether a frame is fixed and has no children, in A and in B.
 
-    The child link of a mimic joint is no tool, even if the multiplier 0 keeps the joint from moving.
+    The child link of a mimic joint is no tool, even if the joint cannot move because its multiplier is 0.
     """
     for tree, link in ((found.a.tree, frame.a), (found.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
@@ -775,12 +754,15 @@ def _is_tool(found: Alignment, frame: FramePair) -> bool:
 
 def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...]:
     """Return the differences that affect motion, ordered from the base to the tips."""
-    tree_a, tree_b = found.a.tree, found.b.tree
+    tree_a, tree_b, tolerance = found.a.tree, found.b.tree, tolerance_of(found.a, found.b)
     placed: list[tuple[float, list[Difference]]] = [
         (len(found.path(i)), _of_step(found, variables, i)) for i in range(len(found.steps))
     ]
     placed += [
-        (len(found.path(frame.previous)) + 0.5, [_of_frame(found, frame)])
+        (
+            len(found.path(frame.previous)) + 0.5,
+            [Difference(f"link {tree_a.links[frame.a]}", "place", None, None, *_beyond(frame, tolerance))],
+        )
         for frame in found.frames
         if frame.differs
     ]
@@ -799,8 +781,8 @@ def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...
 def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree, link: str) -> bool:
     """Return whether a link belongs to matching rigid bodies in A and in B.
 
-    If the bodies do not match, only one of the two models has the joint that moves the body. `same` already
-    reports this joint as a difference.
+    If the bodies do not match, only A or only B has the joint that moves the body. `differences` already
+    reports this joint.
     """
     alone_a = {found.a.body_of[j + 1] for j in found.only_a}
     alone_b = {found.b.body_of[j + 1] for j in found.only_b}
@@ -811,7 +793,7 @@ def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree,
 
 
 def _carrier(tree: KinematicTree, link: str) -> str:
-    """Return words that name the last moving joint on the path from the base to a link."""
+    """Return words for the last moving joint before a link."""
     path = [tree.joints[i] for i in tree.path(tree.link_index(link)) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 
@@ -838,13 +820,8 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
 
 
 def _beyond(one: Step | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; rounding errors become 0."""
+    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; 0 if within rounding."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
-
-
-def _of_frame(found: Alignment, frame: FramePair) -> Difference:
-    sizes = _beyond(frame, tolerance_of(found.a, found.b))
-    return Difference(f"link {found.a.tree.links[frame.a]}", "place", None, None, *sizes)
 
 
 def remarks(
@@ -857,14 +834,8 @@ def remarks(
 ) -> tuple[Difference, ...]:
     """Return the differences that do not affect motion: joint limits, joint types, links of only one model.
 
-    Args:
-        found: The alignment of the models.
-        variables: The common variables of the two models.
-        tolerance: The tolerance within which numbers are equal.
-        single: Relative error of a number that is rounded to single precision; 0 if both models have double
-            precision.
-        as_written: Whether to compare limits as written. Otherwise, B's limits are first converted to the
-            coordinate of A's joint.
+    `single` is the relative error of a number in single precision, or 0. Unless `as_written` is true, B's
+    limits are first converted to the coordinate of A's joint.
     """
     some = list[Difference]()
     for step in found.steps:
@@ -892,15 +863,12 @@ def remarks(
 
 
 def _in_order(which: str, value: Value) -> tuple[Value, Value]:
-    """Return (value, None) if only A has the value, or (None, value) if only B has it."""
+    """Return the values in A and in B of a parameter that only one model has."""
     return (value, None) if which == "A" else (None, value)
 
 
 def idle(joint: Joint) -> Lock | None:
-    """Return the `Lock` of a mimic joint with the multiplier 0; None for every other joint.
-
-    `same` treats a mimic joint with the multiplier 0 as a fixed joint.
-    """
+    """Return the lock of a mimic joint with the multiplier 0, which `same` treats as fixed; else None."""
     lock = joint.lock
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 
@@ -910,14 +878,9 @@ def limit_differences(
 ) -> Iterator[Difference]:
     """Yield the differences between two joints' kinds and limits.
 
-    Args:
-        a: The joint of A.
-        b: The joint of B.
-        tolerance: Tolerance of a limit, relative to the larger of its absolute value and 1 (rad or m).
-        single: Relative error of a limit that is rounded to single precision; 0 if the limits have double
-            precision.
-        zero: Pair (sign, offset) with (value in B) = sign * (value in A) + offset. The function uses this
-            formula to convert B's limits to A's coordinate.
+    `tolerance` is relative to the larger of 1 (rad or m) and the limit's absolute value. `single` is the
+    relative error of a limit in single precision, or 0. With `zero` = (sign, offset), B's limits are
+    converted to A's coordinate: (value in B) = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:
@@ -938,5 +901,4 @@ def _close(x: float, y: float, share: float, single: float) -> bool:
 
 
 def _finite(x: float) -> float | None:
-    """Return a limit, or None if the limit is infinite."""
     return x if math.isfinite(x) else None

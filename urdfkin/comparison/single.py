@@ -69,7 +69,6 @@ import numpy as np
 from urdfkin.comparison.result import JointDifference, angle, length
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
-    Mechanism,
     Screw,
     Step,
     Tolerance,
@@ -83,10 +82,8 @@ class JointComparison:
     """The comparison of two aligned models joint by joint, without changes of the models.
 
     Args:
-        found: The alignment of the two models. The class uses only the pairs of joints and links in this
-            alignment.
-        joints: Bounds (joints, 3) of A and of B, as in `SinglePrecision.joints`. The bounds are zero for a
-            model in double precision.
+        found: The alignment of the two models; only its pairs of joints and links are used.
+        joints: Bounds (joints, 3) of A and of B, as in `SinglePrecision.joints`; 0 for double precision.
         base: (4, 4) pose of B's root in A's root frame, for unchanged models.
         tolerance: The largest differences that count as rounding of double precision.
     """
@@ -128,9 +125,9 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _way(self, link: int) -> tuple[int, list[int]]:
-        """Return the nearest ancestor in A that both models have, and the joints from it to the link.
+        """Return the link's nearest ancestor in A that both models have, and the joints between the two.
 
-        If there is no such ancestor, return the link at which all paths begin.
+        Without such an ancestor, the result has the link at which all paths begin.
         """
         joints, path = self.found.a.tree.joints, list[int]()
         while link:
@@ -159,7 +156,7 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "is carried by other joints in the other model")
             return
-        # The list paths[1][0] contains the joints of B between the common ancestor and the reference link P.
+        # The joints paths[1][0] of B lie between the common ancestor and the reference link P.
         if self.joints[0].any() and (len(steps) > 1 or self.joints[1][paths[1][0]].any()):
             yield JointDifference(name, "", None, "is carried by joints without a common link between them")
             return
@@ -175,9 +172,8 @@ class JointComparison:
             joint = f"joint {trees[0].joints[step.a].name}"
             pair, bound = zip(*(screws[k][i] for k, i in enumerate((step.a, step.b))), strict=True)
             beyond = list(self._beyond(joint, "axis", *self._between(step, *pair), bound[0] + bound[1]))
-            if (
-                beyond and off
-            ):  # a shifted link origin also shifts the axis, so compare the axes in the link's frame
+            # A shifted link origin also shifts the axis, so the axes are compared in the link's frame.
+            if beyond and off:
                 seen = [screw.moved(inverse(T)) for screw, T in zip(pair, poses, strict=True)]
                 beyond = list(
                     self._beyond(joint, "axis", *self._between(step, *seen), sum(bound) + sum(bounds))
@@ -185,10 +181,9 @@ class JointComparison:
             yield from beyond
 
     def _between(self, step: Step, axis: Screw, other: Screw) -> tuple[float, float]:
-        """Return the angle and the distance of two axes.
+        """Return the angle of two axes, and the distance of one axis' point from the other axis.
 
-        The point of an axis may lie anywhere on this axis. Therefore, only the point's distance from the
-        other axis is computed.
+        The point of an axis may lie anywhere on this axis.
         """
         ends = (axis, other) if self.joints[0].any() else (other, axis)
         return between(*ends, turns=step.kind == "turns")[1:]
@@ -198,11 +193,8 @@ class JointComparison:
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
         """Return a path's joint screws and the pose at its end, with bounds (m, rad) on their errors.
 
-        Args:
-            which: 0 for A, 1 for B.
-            back: The fixed joints from the last common link to the reference link. Results are in the frame
-                of this link.
-            path: The joints from the last common link to the end of the path.
+        Both joint lists begin at the last common link. The list `back` has the fixed joints to the reference
+        link, in whose frame the results are. `which` is 0 for A and 1 for B.
         """
         tree = self.mechanisms[which].tree
         start, own = np.eye(4), np.zeros(2)
@@ -212,7 +204,7 @@ class JointComparison:
         screws: dict[int, tuple[Screw, FloatArray]] = {}
 
         def placed() -> FloatArray:
-            """Return the error bounds of the current frame relative to the reference link."""
+            """Return the error bounds (m, rad) of the current frame relative to the reference link."""
             lever = float(np.linalg.norm((seen @ T)[:3, 3])) if back else 0.0
             return np.asarray(off + own + np.array([own[1] * lever, 0.0]))
 
@@ -240,18 +232,17 @@ class JointComparison:
             yield JointDifference(place, what, None, " and ".join(sizes), explained)
 
     def _of_free_joint(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
-        """Compare a planar or floating joint, which must be attached to the root body.
-
-        Yield its differences.
-        """
+        """Yield the differences of a planar or floating joint, which must be attached to the root body."""
         a, b = self.found.a, self.found.b
         ends = [(a, paths[0]), (b, paths[1])]
-        if not all(len(path) == 1 and not _body_before(mechanism, path[0]) for mechanism, path in ends):
+        parents = [mechanism.tree.joints[path[0]].parent for mechanism, path in ends]
+        bodies = [a.body_of[parents[0]], b.body_of[parents[1]]]  # the root body has the index 0
+        if any(bodies) or not all(len(path) == 1 for path in paths):
             why = "follows a planar or floating joint that is not compared joint by joint"
             yield JointDifference(name, "", None, why)
             return
         for T, other in (
-            [mechanism.homes[mechanism.tree.joints[path[0]].parent] for mechanism, path in ends],
+            [mechanism.homes[link] for (mechanism, _), link in zip(ends, parents, strict=True)],
             [mechanism.homes[path[0] + 1] for mechanism, path in ends],
         ):
             if not self.tolerance.holds(*apart(T, self.base @ other)):
@@ -259,10 +250,7 @@ class JointComparison:
                 yield JointDifference(name, "", None, why)
 
     def _of_rule(self, step: Step) -> Iterator[JointDifference]:
-        """Compare the multipliers and the offsets of two mimic rules.
-
-        Yield each difference that exceeds rounding.
-        """
+        """Yield each difference of two mimic rules that exceeds rounding."""
         trees = self.found.a.tree, self.found.b.tree
         a, b = trees[0].joints[step.a].mimic, trees[1].joints[step.b].mimic
         place = f"joint {trees[0].joints[step.a].name}"
@@ -278,8 +266,3 @@ class JointComparison:
             if abs(x - y) > share * size + self.tolerance.angle * max(1.0, size):
                 explained = f"{share * size:.2g}" if share else ""
                 yield JointDifference(place, f"mimic {what}", x, y, explained)
-
-
-def _body_before(mechanism: Mechanism, joint: int) -> int:
-    """Return the body that carries a joint; 0 is the root body."""
-    return mechanism.body_of[mechanism.tree.joints[joint].parent]

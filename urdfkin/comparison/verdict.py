@@ -55,12 +55,12 @@ from urdfkin.verify.verifier import checked_choice
 
 #: Number of configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: The search for the frame with the largest distance considers only this number of frames: the frames with
-#: the largest distances at random configurations.
+#: Number of frames among which the frame with the largest distance is searched.
+#: These frames have the largest distances at random configurations.
 FARTHEST = 4
-#: Longest allowed path length, metres. The squares of longer lengths would overflow.
+#: Longest allowed path, metres; the squares of longer lengths would overflow.
 LONGEST = 1e150
-#: An upper bound needs no improvement if it is at most this factor times the largest distance found.
+#: An upper bound of at most NEAR times the largest distance found needs no improvement.
 NEAR = 1.05
 
 
@@ -116,12 +116,12 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
-    # A comparison stores many compiled trees in the two robots, so it works on copies of the user's robots.
+    # The copies protect the user's robots: a comparison stores many compiled trees in its robots.
     return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
 
 
 def _parse_given_map(given: Mapping[str, str] | None) -> dict[str, str]:
-    """Return the user's map of joints as a dict; raise InputError if it does not map names to names."""
+    """Return the user's map of joints; raise InputError if it does not map names to names."""
     if given is None:
         return {}
     if not isinstance(given, Mapping) or any(
@@ -141,16 +141,7 @@ def _robot(source: Robot | Source | DHTable) -> Robot:
 
 
 class Comparator:
-    """The comparison of two robots, step by step.
-
-    Args:
-        robots: A and B.
-        given: For each joint name of A, the name of the matching joint in B.
-        bounds: Whether to bound the largest distances.
-        boxes: Largest number of boxes of configurations that exist at the same time.
-        within: Distance (metres and radians) for which the bounds should give a proof; None if no distance is
-            given.
-    """
+    """The comparison of two robots, step by step; `same` explains the arguments."""
 
     def __init__(
         self,
@@ -189,7 +180,7 @@ class Comparator:
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
 
     def judged(self) -> Sameness:
-        """Return the complete result: verdict, intervals and Pinocchio's confirmation."""
+        """Return the complete result, with intervals and Pinocchio's confirmation."""
         found = self.alignment()
         self._check_map(found)
         variables = variables_of(found, self.tolerance)
@@ -213,11 +204,7 @@ class Comparator:
         return align(*self.mechanisms, {**self.spelled, **self.given})
 
     def said(self, found: Alignment, variables: Variables) -> Sameness:
-        """Return the result that follows from the alignment, without intervals and without confirmation.
-
-        The method also sets the tool frames in `found`. A tool is a frame without children that differs
-        between A and B.
-        """
+        """Return the result without intervals and confirmation; set the tool frames in `found`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
         tables = any(robot.origin.table for robot in self.robots)
@@ -270,7 +257,7 @@ class Comparator:
         )
 
     def single(self, found: Alignment, variables: Variables) -> tuple[float, float] | None:
-        """Return the distance and angle (m, rad) between frames that single precision can cause, or None.
+        """Bound the distance and angle (m, rad) between frames that single precision can cause, or None.
 
         The bound is the sum of the errors of both files and of the rounding errors of double precision.
         """
@@ -288,8 +275,7 @@ class Comparator:
     def unexplained(self, found: Alignment) -> tuple[JointDifference, ...]:
         """Return the differences of the unchanged models that rounding does not explain, joint by joint.
 
-        The function compares A with B and also B with A, because the two comparisons have different bounds
-        (`urdfkin.comparison.single`).
+        A is compared with B, and B with A, because the bounds differ (`urdfkin.comparison.single`).
         """
         off = [
             np.zeros((len(tree.joints), 3)) if robot.single is None else robot.single.joints
@@ -308,10 +294,8 @@ class Comparator:
     def as_written(self, found: Alignment) -> Alignment:
         """Return the alignment of the unchanged models, with the joint and link pairs of `found`.
 
-        No joint direction, joint zero, tool frame or base pose is changed in this alignment.
-        `base_as_written` computes the pose of B's root. If one model is a Denavit-Hartenberg table, only
-        links with equal names are compared, because the poses of the table's other links depend on its
-        convention.
+        If one model is a Denavit-Hartenberg table, only links with equal names are compared, because the
+        poses of the table's other links depend on its convention.
         """
         a, b = self.mechanisms
         gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=found.b.orders)
@@ -320,14 +304,12 @@ class Comparator:
         return written
 
     def _compared_links(self, found: Alignment) -> list[tuple[int, int]]:
-        """Return the pairs of matching links whose poses in the two unchanged models are compared."""
         tables = any(robot.origin.table for robot in self.robots)
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in found.frames)
         return [(a, b) for a, b in pairs if not tables or links[0][a] == links[1][b]]
 
     def _check_map(self, found: Alignment) -> None:
-        """Raise InputError if the given map contains a pair of joints that cannot be matched."""
         made = found.names
         for ours, theirs in self.given.items():
             if made.get(ours) != theirs:
@@ -339,14 +321,12 @@ class Comparator:
                 )
 
     def search(self, found: Alignment, variables: Variables, *, as_written: bool = False) -> Search:
-        """Return a search for the largest distances between matching frames."""
         return Search(self.robots, found, variables, as_written=as_written)
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
         """Bound the distance and the angle (m, rad) between two frames that differ only by rounding.
 
         `same` ignores a small rounding difference at each joint, and these differences add up along the path.
-
         For a joint without limits, the sum uses the range in which the joint is sampled.
         """
         ways = [
@@ -386,10 +366,7 @@ class Comparator:
     def _most(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) that is valid for all frames.
-
-        The function improves the bound only if the improved bound can prove the distance `within`.
-        """
+        """Return one bound (m, rad) for all frames; improve it only if it can then prove `within`."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
@@ -402,7 +379,7 @@ class Comparator:
         return most[0] + metres, most[1] + radians
 
     def _uppers(self, found: Alignment, variables: Variables) -> list[tuple[float, float]]:
-        """Return the bound (m, rad) of each frame; compute the largest bounds on a finer grid."""
+        """Return the bound (m, rad) of each frame; the largest bounds are computed on a finer grid."""
         frames = found.frames
         uppers = [upper_bounds(found, variables, frame) for frame in frames]
         off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
@@ -415,10 +392,7 @@ class Comparator:
     def _sharpen(
         self, uppers: list[tuple[float, float]], frames: Sequence[FramePair], search: Search, target: float
     ) -> None:
-        """Prove with boxes that no two matching frames are farther apart than a target (m).
-
-        The frames with the largest bounds come first.
-        """
+        """Prove with boxes that no two matching frames are farther apart than a target (m)."""
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -429,14 +403,14 @@ class Comparator:
                 break
 
     def _farthest(self, found: Alignment, variables: Variables) -> Interval | None:
-        """Search for the frame that is farthest apart in A and B, and return the interval of its distance."""
+        """Search for the frame with the largest distance between A and B, and return its interval."""
         if not found.frames:
             return None
         metres, radians = self.rounding(found, variables)
         search = self.search(found, variables, as_written=True)
         off = search.seen(found.frames)[0].max(axis=0)
         far = [found.frames[k] for k in np.argsort(-off, kind="stable")[:FARTHEST]]
-        if off.max() <= metres:  # no position differs: take the frame with the largest angle
+        if off.max() <= metres:  # no position differs, so the frame with the largest angle counts
             far = [max(found.frames, key=lambda frame: upper_bounds(found, variables, frame)[1])]
         climbed = zip(search.worst(far), far, strict=True)
         seen, frame = max(climbed, key=lambda both: both[0][0])
@@ -465,10 +439,7 @@ class Comparator:
         return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
     def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> Confirmation:
-        """Check the bounds with Pinocchio at some configurations.
-
-        Pinocchio reads the texts of A and B with its own parser.
-        """
+        """Check the bounds with Pinocchio, which reads the texts of A and B with its own parser."""
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
             return Confirmation("not asked", reason="loaded with verify=False")
         for robot in self.robots:
@@ -493,7 +464,6 @@ class Comparator:
 
 
 def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Return the largest bound in metres and the largest bound in radians."""
     return max((way for way, _ in bounds), default=0.0), max((turn for _, turn in bounds), default=0.0)
 
 
@@ -509,13 +479,8 @@ def _fixed_here(
 ) -> set[int]:
     """Return the fixed joints of a tree that are moving joints in the other tree.
 
-    Joints are matched by the joint's name or by the label of the child link.
-
-    Args:
-        tree: The tree.
-        other: The other tree.
-        names: For each joint with different names in the two trees: its name in the other tree.
-        labels: A label for each link of both trees.
+    Two joints match if they have the same name, or if their child links have the same label. `names` maps the
+    name of a joint to its different name in the other tree. `labels` has a label for each link of both trees.
     """
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
@@ -537,9 +502,8 @@ def _with_idle_joints_fixed(
 ) -> KinematicTree:
     """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
 
-    A joint with the multiplier 0 never moves. It remains a mimic joint if the other model has a matching
-    joint that moves: then `same` compares the two joints. Joints match by name (`names`), or by the label of
-    their child link. The arguments are described in `_fixed_here`.
+    A joint with the multiplier 0 never moves. The joint remains a mimic joint if the other model has a
+    matching joint (as in `_fixed_here`) that moves: then `same` compares the two joints.
     """
     moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
@@ -563,9 +527,8 @@ def _spelled_alike(
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
     """Return link labels of two models, and pairs of joints whose names differ only by USD's spelling.
 
-    USD does not allow all names, so a USD file contains other spellings of some names. Several spellings are
-    possible. A name in the USD file is matched to a name of the other model, unless a second name of the
-    other model has the same spelling.
+    USD does not allow all names, so a USD file spells some names differently. Such a name is matched to a
+    name of the other model, unless a second name of the other model has the same spelling.
     """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
@@ -593,8 +556,8 @@ def _originals(names: Sequence[str], spelt: Sequence[str]) -> dict[str, str]:
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
     """Return the pose (4, 4) of B's root in A's root frame, if the two models are not changed.
 
-    The root body of one model may contain a link with the name of the other model's root. Then the two links
-    of this name coincide. Otherwise, the two roots coincide.
+    If the root body of one model has a link with the name of the other model's root, these two links
+    coincide. Otherwise, the two roots coincide.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.homes[link])

@@ -1,10 +1,7 @@
 """Accuracy study: errors of urdfkin and of Pinocchio relative to values with at least fifty digits.
 
 The values with fifty digits are intervals that contain the true values. Therefore, no error is
-underestimated.
-
-Errors are in eps * scale. Verification uses the same scale, so you can compare the errors with the numbers of
-a validation report.
+underestimated. Errors are in eps * scale, like the numbers of a validation report.
 """
 
 from __future__ import annotations
@@ -50,24 +47,18 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _BALLS = np.vectorize(exact, otypes=[object])
-#: The accuracy study has one line in its table for all sequences of Euler angles, and one line for
-#: quaternions.
+#: The table has one line for all sequences of Euler angles, and one line for quaternions.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
-#: urdfkin is called less accurate if its typical or worst error is more than FACTOR times Pinocchio's error.
+#: urdfkin is called less accurate if its typical or worst error exceeds FACTOR * (Pinocchio's error).
 FACTOR = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Errors of one library with respect to the values at fifty digits, in eps * scale.
-
-    Attributes:
-        worst: The largest error.
-        typical: The root mean square of the errors.
-    """
+    """Errors of one library with respect to the values at fifty digits, in eps * scale: maximum and RMS."""
 
     worst: float
     typical: float
@@ -77,13 +68,8 @@ class Errors:
 class Line:
     """The errors of urdfkin and of Pinocchio for one quantity in one reference frame.
 
-    Attributes:
-        quantity: Name of the quantity.
-        reference: Name of the reference frame, None for placements. For analytical Jacobians: the
-            representation of the orientation.
-        numbers: Number of compared values.
-        urdfkin: The errors of urdfkin.
-        pinocchio: The errors of Pinocchio.
+    The reference frame of a placement is None. For analytical Jacobians, `reference` is the representation of
+    the orientation. `numbers` is the number of compared values.
     """
 
     quantity: str
@@ -94,7 +80,7 @@ class Line:
 
     @property
     def ours_is_worse(self) -> bool:
-        """Whether the typical or worst error of urdfkin is more than twice Pinocchio's."""
+        """Whether the typical or worst error of urdfkin is more than `FACTOR` times Pinocchio's."""
         return (
             self.urdfkin.typical > FACTOR * self.pinocchio.typical
             or self.urdfkin.worst > FACTOR * self.pinocchio.worst
@@ -103,15 +89,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """Result of the accuracy study of one robot.
-
-    Attributes:
-        robot: Name of the robot.
-        samples: Number of configurations.
-        seed: Seed of the random samples.
-        lines: One line for each quantity and reference frame.
-        moving_base: Whether the root link moved.
-    """
+    """Result of the accuracy study of one robot, with one line for each quantity and reference frame."""
 
     robot: str
     samples: int
@@ -124,25 +102,15 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
     """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
     The quantities are each link's placement, velocity, Jacobian, analytical Jacobians, Jacobian rate and
-    acceleration.
+    acceleration. The configurations are the first random configurations of `validate`. One configuration
+    takes almost a second. The root link is fixed without `base`, which is one motion or (samples, ...).
 
-    The study contains one line for the analytical Jacobians of all twelve sequences of Euler angles, and one
-    line for the analytical Jacobians of quaternions. Angles about fixed axes (such as roll, pitch and yaw)
-    are left out: they have the same Jacobians as the corresponding Euler angles, with the rows in reverse
-    order. Samples nearer to a singularity than `Robot.analytical_jacobian` accepts are skipped. A sample is
-    also skipped if rounding errors make the sign of the quaternion uncertain. Pinocchio computes no
-    analytical Jacobians. Therefore, the study inserts the rotation and the Jacobian of each library into eq.
-    7.122.
-
-    Args:
-        robot: The loaded robot.
-        samples: Number of configurations; they are the first random configurations of `validate`. The study
-            of a configuration takes almost a second.
-        seed: Seed of the samples. The same seed gives the same numbers.
-        base: Motion of the root link: one for all samples, or (samples, ...). None: the root link is fixed.
-
-    Returns:
-        The errors of urdfkin and of Pinocchio, with one line for each quantity and reference frame.
+    The result has one line for the analytical Jacobians of all twelve sequences of Euler angles, and one line
+    for the analytical Jacobians of quaternions. Angles about fixed axes (such as roll, pitch and yaw) are
+    left out: they have the same Jacobians as the corresponding Euler angles, with the rows in reverse order.
+    Samples nearer to a singularity than `Robot.analytical_jacobian` accepts are skipped. A sample is also
+    skipped if rounding errors make the sign of the quaternion uncertain. Pinocchio computes no analytical
+    Jacobians. Therefore, the study inserts the rotation and the Jacobian of each library into eq. 7.122.
 
     Raises:
         OracleError: Pinocchio does not accept the robot.
@@ -166,8 +134,6 @@ class _Compared(NamedTuple):
 
 
 class _Work:
-    """A batch of samples, with the inputs for urdfkin, Pinocchio and the computation with 50 digits."""
-
     def __init__(self, robot: Robot, x: Samples, base: BaseMotion | None) -> None:
         if base is not None and base.batch_shape not in ((), (len(x.q),)):
             raise InputError(
@@ -191,7 +157,6 @@ class _Work:
         ]
 
     def lines(self) -> Iterator[Line]:
-        """Yield one line for each quantity and reference frame."""
         for reference in (None, *Reference):
             for row in validated():
                 if row.exact is not None and reference in row.references:
@@ -244,8 +209,8 @@ class _Work:
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
     """Return indices (n, links, most) of the columns that move each link.
 
-    Here `most` is the largest number of columns that move a link. For a link with fewer columns, the array
-    also contains indices of columns that are 0.
+    Here `most` is the largest number of columns that move a link. A link with fewer columns also has indices
+    of columns that are 0.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
@@ -258,16 +223,11 @@ def _columns(J: NDArray[Any], which: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def _one(base: BaseNumbers, k: int) -> BaseNumbers:
-    """Return the base motion of one sample."""
     return BaseRows(base.placement[k], base.velocity[k], base.acceleration[k])
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return the unit quaternions (m, 4) of rotations (m, 3, 3).
-
-    Quaternions q and -q describe the same rotation. The function chooses the sign of the corresponding
-    quaternion in `near`.
-    """
+    """Return the unit quaternions (m, 4) of rotations (m, 3, 3), with the signs of the quaternions `near`."""
     K = davenport(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
@@ -275,7 +235,6 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
 
 
 def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -> Line:
-    """Return the errors of urdfkin and of Pinocchio for one quantity."""
     sides: tuple[list[FloatArray], list[FloatArray]] = [], []
     for ours, theirs, true, scale in compared:
         counted = scale > 0.0

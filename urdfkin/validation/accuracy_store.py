@@ -1,8 +1,7 @@
 """Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
-The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks. The
-name of the file is the sha256 of all data on which the numbers in the file depend. The file contains a
-checksum.
+The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks, with
+a checksum. The name of the file is the sha256 of all data on which the numbers in the file depend.
 """
 
 from __future__ import annotations
@@ -24,20 +23,12 @@ from urdfkin.verify.oracles import version
 
 @dataclass(frozen=True, slots=True)
 class NotJudged:
-    """The reason why a robot has no result of the accuracy study."""
-
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class StudySettings:
-    """Settings of the accuracy study.
-
-    Attributes:
-        samples: Number of configurations of each robot.
-        seed: Seed of the random samples.
-        moving_base: Whether the root link of each robot has a random motion.
-    """
+    """Settings of the accuracy study; with `moving_base`, the root link of each robot has a random motion."""
 
     samples: int
     seed: int
@@ -51,23 +42,12 @@ class StudySettings:
 
 
 class AccuracyResult:
-    """The accuracy results in a store.
-
-    Args:
-        store: The store.
-        settings: The settings of the study.
-    """
-
     def __init__(self, store: Store, settings: StudySettings) -> None:
         self._store, self._settings = store, settings
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
-        """Copy results that are missing in this store from other stores of the same validation.
-
-        Raises:
-            InputError: The stores have different settings of the study.
-        """
+        """Copy missing results from other stores; raise InputError if a store has other settings."""
         theirs = [results for results in map(cls.of, others) if results is not None]
         if theirs:
             own = cls.of(store) or cls(store, theirs[0]._settings)
@@ -79,10 +59,7 @@ class AccuracyResult:
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
-        """Return the results of the accuracy study that has the latest settings.
-
-        None: no accuracy study was requested.
-        """
+        """Return the results with the latest settings; None: no accuracy study was requested."""
         try:
             if (content := read_if_there(store.folder / JUDGE)) is None:
                 return None
@@ -96,11 +73,9 @@ class AccuracyResult:
         return cls(store, settings)
 
     def begin(self) -> None:
-        """Write the settings into the store."""
         self._store.write(JUDGE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
     def found(self, robot: int) -> Judgement | NotJudged | None:
-        """Return the result of a robot; None if the store has none."""
         return self._store.kept(self._key(robot), JUDGED, _read)
 
     def has(self, robot: int) -> bool:
@@ -108,7 +83,6 @@ class AccuracyResult:
         return self._store.has(self._key(robot), JUDGED)
 
     def keep(self, robot: int, found: Judgement | NotJudged) -> None:
-        """Write the result of a robot into the store."""
         key = self._key(robot)
         self._store.keep_part(key, JUDGED, packed(key, {"judge": found}))
 
@@ -133,7 +107,7 @@ class AccuracyResult:
     def _key(self, robot: int) -> str:
         manifest = self._store.manifest
         origin, stamp = manifest.robots[robot]
-        origin = replace(origin, oracle=None)  # a second oracle does not affect the study
+        origin = replace(origin, oracle=None)  # the study does not use a second oracle
         parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), stamp]
         return hashlib.sha256(json.dumps([LAYOUT, "judge", *parts], sort_keys=True).encode()).hexdigest()
 

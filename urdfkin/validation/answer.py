@@ -4,8 +4,8 @@ Every exception that a robot raises becomes an answer. An answer is plain data, 
 be sent between processes.
 
 A file contains compressed JSON with the key of its chunk and a checksum (sha256). The file may come from
-another machine, so it contains only data and no code. Before the data of a file is used, the module detects
-damaged, truncated, renamed and foreign files.
+another machine, so it contains only data and no code. Damaged, truncated, renamed and foreign files are
+detected before their data are used.
 """
 
 from __future__ import annotations
@@ -33,12 +33,10 @@ class Failure:
 
     Attributes:
         verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
-        reason: The reason as text.
-        portrait: Summary of the robot, with only the parts of the robot that could be read.
+        portrait: Summary of the parts of the robot that could be read.
         error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the cause of the failure is the process or the cluster instead of the robot. A
-            failure of the process or the cluster is not stored, so that a resumed run computes the chunk
-            again.
+        passing: Whether the process or the cluster caused the failure, not the robot. Such a failure is not
+            stored, so that a resumed run computes the chunk again.
     """
 
     verdict: Verdict
@@ -48,7 +46,6 @@ class Failure:
     passing: bool = False
 
 
-#: The answer of a chunk.
 Answer = ChunkResult | Failure
 
 
@@ -61,7 +58,6 @@ def answer(chunk: Chunk) -> Answer:
 
 
 def failure(subject: RobotInput, error: Exception) -> Failure:
-    """Return the answer for a robot that raised an exception."""
     if isinstance(error, UrdfError):
         return Failure(Verdict.BAD_INPUT, str(error), RobotSummary(findings=entries_of(error.findings)))
     if isinstance(error, OracleError):
@@ -72,21 +68,16 @@ def failure(subject: RobotInput, error: Exception) -> Failure:
 
 
 def unexpected_error(error: Exception) -> str:
-    """Return the message for an unexpected error."""
     message = " ".join(str(error).split()) or "no message"
     return f"unexpected error in urdfkin, please report it: {type(error).__name__}: {message}"
 
 
 def format_traceback(error: Exception) -> str:
-    """Return the whole traceback of an error."""
     return "".join(traceback.format_exception(error))
 
 
 def _portrait(subject: RobotInput) -> RobotSummary:
-    """Return the summary of a robot, without a check of its tables.
-
-    If the robot cannot be read, return the empty summary.
-    """
+    """Return the summary of a robot without a check of its tables; the empty summary if it cannot be read."""
     try:
         return RobotSummary.of(subject.read(), None)
     except Exception:
@@ -95,31 +86,23 @@ def _portrait(subject: RobotInput) -> RobotSummary:
 
 _MAGIC = b"urdfkin-chunk/1\n"
 _DIGEST = hashlib.sha256().digest_size
-#: Maximum size of an unpacked file, bytes. No answer of urdfkin is larger.
+#: Maximum size of an unpacked file, bytes; no answer of urdfkin is larger.
 _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """Error for a damaged file, which does not contain the results of the chunk.
-
-    The message states the reason.
-    """
+    """Error for a file that does not contain the results of its chunk; the message states the reason."""
 
 
 def written(key: str, found: Answer) -> bytes:
-    """Return an answer as the bytes of its file."""
     if isinstance(found, Failure):
         return packed(key, {"failure": found})
-    rows = list(found.tallies.items())  # a key of a JSON object cannot be a pair
+    rows = list(found.tallies.items())  # a key of a JSON object must be a string
     return packed(key, {"tallies": rows, "result": replace(found, tallies={})})
 
 
 def read(key: str, content: bytes) -> Answer:
-    """Return the answer of a chunk from the bytes of its file.
-
-    Raises:
-        DamagedError: The file is damaged, or belongs to another chunk.
-    """
+    """Return the answer of a chunk; raise DamagedError if the file is damaged or belongs to another chunk."""
     body = unpacked(key, content)
     try:
         if "failure" in body:
@@ -141,11 +124,7 @@ def packed(key: str, body: dict[str, Any]) -> bytes:
 
 
 def unpacked(key: str, content: bytes) -> dict[str, Any]:
-    """Return the data in the bytes of a file.
-
-    Raises:
-        DamagedError: The content is damaged or belongs to another key.
-    """
+    """Return the data in a file; raise DamagedError if the file is damaged or belongs to another key."""
     checksum, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
     if not content.startswith(_MAGIC):
         raise DamagedError("not a chunk of urdfkin")

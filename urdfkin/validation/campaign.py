@@ -121,15 +121,14 @@ def validate(
         raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
     given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
-    pinocchio()  # tested before the work, so that a missing Pinocchio is reported at once
+    pinocchio()  # a missing Pinocchio is reported before the work
     found, unread = subjects(given, mimic, root_joint, xacro_args, lock, joints)
     if oracle_library(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
     cut = Cut(samples)
     collector = ResultCollector(found, cut, shares(len(found), cut, shard), progress)
-    memory_limit = (
-        memory.share(jobs) if executor is None else None
-    )  # with an executor, each machine computes its own memory limit
+    # Each machine of an executor computes its own limit.
+    memory_limit = memory.share(jobs) if executor is None else None
     campaign = _Campaign(found, cut, seed, memory_limit, collector)
     interrupted, open_store, begin = False, None, time.perf_counter()
     with contextlib.ExitStack() as stack:
@@ -145,7 +144,7 @@ def validate(
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if _kernels_pay(len(missing) * samples) and (isolate or any(map(_is_robot, missing))):
-                load_kernels()  # compile here, not in the workers, so that no robot's time includes it
+                load_kernels()  # a compilation in a worker would count as a robot's computing time
                 begin = time.perf_counter()
             collector.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
@@ -170,7 +169,6 @@ def validate(
 
 
 def _folder(store: str | os.PathLike[str]) -> Path:
-    """Return the path of a store; raise InputError if the argument is not a valid path."""
     try:
         name = os.fsencode(store)
     except (TypeError, ValueError):
@@ -183,7 +181,7 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _is_robot(subject: RobotInput) -> bool:
-    """Return whether a robot can be loaded. If not, the robot's first chunk reports the error."""
+    """Return whether a robot can be loaded; otherwise, the robot's first chunk reports the error."""
     try:
         subject.load()
     except Exception:
@@ -195,9 +193,6 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
     """Return the report of a store, which is equal to the report of an uninterrupted run.
 
     Until the store is complete, the report is marked as interrupted.
-
-    Args:
-        folder: The store.
 
     Raises:
         SourceError, InputError: The folder is not a store.
@@ -226,7 +221,7 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     """Return the accuracy results of the compared robots, and whether no result is missing."""
     if not store.has_judge:
         return (), True
-    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  needs python-flint
+    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  python-flint may be missing
 
     if (results := AccuracyResult.of(store)) is None:
         return (), True
@@ -234,8 +229,8 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
 
 
-#: Compiled kernels save time for runs with more samples than this. The first number applies to kernels on
-#: disk, and the second number to kernels that must be compiled.
+#: Compiled kernels save time for runs with more samples than this number.
+#: The first number applies to kernels on disk, the second to kernels that must be compiled.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
@@ -246,8 +241,6 @@ def _kernels_pay(samples: int) -> bool:
 
 @dataclass
 class _Campaign:
-    """The chunks of a run: the known answers and the missing chunks."""
-
     subjects: Sequence[RobotInput]
     cut: Cut
     seed: int
@@ -267,14 +260,12 @@ class _Campaign:
         self.store = store
 
     def work(self) -> Iterator[Iterator[Task]]:
-        """Return the missing tasks of each robot, as iterators."""
         return (self._tasks(robot) for robot in range(len(self.subjects)))
 
     def _tasks(self, robot: int) -> Iterator[Task]:
         return (self.task(robot, index) for index in self.collector.missing(robot))
 
     def enter(self, task: Task, found: Answer) -> None:
-        """Save an answer in the store, and then add it to the collected answers."""
         if self.store is not None and not (isinstance(found, Failure) and found.passing):
             self.store.keep(task.robot, task.chunk.index, found)
         self.collector.enter(task, found)
@@ -284,10 +275,7 @@ def shares(robots: int, cut: Cut, shard: str | None = None) -> list[range]:
     """Return the chunks of each robot that belong to a shard; without a shard, all chunks.
 
     The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read
-    only once.
-
-    Raises:
-        InputError: `shard` is not of the form i/n.
+    only once. A shard that is not of the form i/n raises InputError.
 
     >>> shares(2, Cut(1000), "1/4"), shares(2, Cut(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])

@@ -4,9 +4,8 @@ A sample depends only on the seed and on the index of the sample. Inputs and res
 data, so a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2 of a
 robot are the neutral configuration, the lower limits and the upper limits.
 
-Samples are drawn 25 at a time, each draw with its own seed. A chunk compares several draws together. The
-number of draws in a chunk does not change any result; it only changes the cost of distributing and storing
-chunks.
+Samples are drawn 25 at a time, each draw with its own seed. The number of draws in a chunk does not change
+any result; it only changes the cost of distributing and storing chunks.
 """
 
 from __future__ import annotations
@@ -29,12 +28,12 @@ from urdfkin.validation.timings import Clock, total
 from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import PINOCCHIO
 
-#: Samples in one draw.
+#: Number of samples in one draw.
 DRAWN = 25
 #: Number of special configurations before the random configurations.
 SPECIAL = 3
-#: Minimum number of chunks of a robot, so that several workers can share the robot. If a robot has fewer
-#: samples than this number, each chunk has one sample.
+#: Minimum number of chunks of a robot, so that several workers can share the robot.
+#: With fewer samples than this number, each chunk has one sample.
 _CHUNKS = 8
 #: Maximum number of draws in a chunk.
 #: For a typical robot, 40 draws take one second and give a few kilobytes of results.
@@ -46,7 +45,6 @@ class Chunk:
     """A range of samples of one robot.
 
     Attributes:
-        subject: The robot.
         seed: Seed of the samples. The random generator of a draw is initialized with this seed and the index
             of the draw.
         index: Index of the chunk within the robot.
@@ -69,11 +67,10 @@ class Chunk:
 
     @property
     def first_sample(self) -> int:
-        """Index of the first sample of the chunk."""
         return 0 if self.first == 0 else SPECIAL + self.first * DRAWN
 
     def draw(self, tree: KinematicTree) -> Samples:
-        """Draw the samples of the chunk; they do not depend on the machine, the workers or the chunk size."""
+        """Draw the samples; they do not depend on the machine, the workers or the chunk size."""
         drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAWN)))]
         return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
 
@@ -85,9 +82,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk: error statistics, names and times.
-
-    The result of the first chunk also contains the robot's summary.
+    """Result of a chunk; only the first chunk of a robot has the robot's summary.
 
     The sum of the results of two adjacent chunks is the result of the combined chunk.
     """
@@ -149,7 +144,6 @@ class Cut:
 
 
 def chunks(subject: RobotInput, samples: int, seed: int, most: int | None = None) -> Iterator[Chunk]:
-    """Yield the chunks of one robot."""
     cut = Cut(samples)
     return (cut.chunk(subject, seed, index, most) for index in range(len(cut)))
 
@@ -176,7 +170,7 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondOracleModel | None]:
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
-    """Compute the quantities of every frame in all reference frames, and compare them with the oracle."""
+    """Compare the quantities of every frame in all reference frames with the oracle's."""
     begin, clock = time.perf_counter(), Clock()
     robot, oracle, second = _loaded(chunk)
     portrait = RobotSummary.of(robot, oracle) if chunk.index == 0 else None

@@ -31,15 +31,15 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: At most _FOR_EACH * (threads of all workers) + _MORE chunks are in flight (sent and not yet answered). With
-#: this number of chunks, no thread waits for its next chunk.
+#: At most _FOR_EACH * (threads of all workers) + _MORE chunks are sent and not yet answered.
+#: With this number of chunks, no thread waits for its next chunk.
 _FOR_EACH, _MORE = 2, 4
 #: Maximum number of times a chunk is sent when Dask loses its worker.
 #: A robot can only crash the process of its chunks, not Dask's worker.
 _TRIES = 20
-#: Time (s) after which the number of workers is read again.
+#: Seconds after which the number of workers is read again.
 _COUNT = 1.0
-#: Packages that must have the same version in this process and on the scheduler, if the scheduler has them.
+#: Packages whose version on the scheduler, if it has them, must be that of this process.
 _COMPARED = ("urdfkin", "pin")
 _NOBODY = RobotInput(b"", Origin(""))
 
@@ -52,10 +52,9 @@ class ClusterError(UrdfkinError, RuntimeError):
 def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> Iterator[Cluster]:
     """Yield an engine on a cluster, for `validate(executor=...)`.
 
-    Args:
-        scheduler: The address of a running scheduler, such as `tls://host:8786`. `local:N` starts N workers
-            on this machine, which end with the engine and open no port.
-        tell: Callback for messages about the number of workers and the dashboard of a running scheduler.
+    The scheduler is the address of a running scheduler, such as `tls://host:8786`. `local:N` starts N workers
+    on this machine, which end with the engine and open no port. The callback `tell` receives messages about
+    the number of workers and the dashboard of a running scheduler.
 
     Raises:
         ClusterError: No scheduler answers at the address, or the versions of urdfkin or Pinocchio differ.
@@ -80,14 +79,13 @@ def _client(scheduler: str) -> Iterator[Client]:
     if kind != "local":
         try:
             client = Client(scheduler, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:  # TypeError: tls:// without a certificate
+        except (OSError, ValueError, TypeError) as error:  # tls:// without a certificate raises TypeError
             found = str(error)
         else:
             with client:
                 yield client
             return
-        # Delete the client that failed in this thread. If the thread of the next client deleted it, Dask
-        # would wait for ever.
+        # Dask would wait for ever if another thread deleted the client that failed.
         gc.collect()
         keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
         raise ClusterError(
@@ -107,13 +105,10 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """Base class for a Dask scheduler and a Dask worker without a web page.
-
-    All users of the machine could open such a web page.
-    """
+    """Base class for a Dask scheduler and a Dask worker without a web page, which all users could open."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
-        """Do nothing; this method overrides Dask's method, which starts a web server."""
+        """Start no web server; this method overrides Dask's."""
 
 
 class _Scheduler(_Portless, Scheduler):
@@ -129,10 +124,8 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers in this process that open no port. Chunks run in separate processes.
 
     Dask adds its scratch folders to the front of `sys.path`. The folders are in a temporary folder of this
-    run, which only this user can access. `sys.path` is restored before any further import.
-
-    Raises:
-        ClusterError: Dask opened a port.
+    run, which only this user can access. `sys.path` is restored before any further import. If Dask opened a
+    port, ClusterError is raised.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         here: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -163,7 +156,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 def _demand_same(client: Client) -> None:
     """Raise ClusterError if a worker or the scheduler has other versions than this process.
 
-    Call this function before anything is sent to the workers or the scheduler.
+    The caller must not send anything to the workers or the scheduler before this check.
     """
     for worker, found in client.run(remote.computes, on_error="return").items():
         if isinstance(found, BaseException):
@@ -207,8 +200,6 @@ class _Flight:
 
 
 class Cluster:
-    """Engine that keeps all current workers of a cluster busy with chunks."""
-
     def __init__(self, client: Client) -> None:
         self._client = client
         self._flying: dict[Future[Any], _Flight] = {}
@@ -273,10 +264,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Release the text of a robot if the workers have no chunk of this robot.
-
-        If the robot is needed later, its text is sent again.
-        """
+        """Release the text of a robot without a chunk on the workers; the text can be sent again."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]
@@ -287,7 +275,7 @@ class Cluster:
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as gone:  # results come through the scheduler, whose connection is lost
+            except OSError as gone:  # results come through the scheduler, which is lost
                 raise self._lost() from gone
             return self._answer(result, flight.task)
         if self._client.status != "running":

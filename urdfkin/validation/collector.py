@@ -1,8 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-Every requested robot has a report. A robot with missing answers is not verified. Results of adjacent chunks
-are added as they arrive, so memory does not grow with the number of samples. Results are added in the order
-of the chunks, so the sums do not depend on the order of arrival.
+Results of adjacent chunks are added as they arrive, so memory does not grow with the number of samples. They
+are added in the order of the chunks, so the sums do not depend on the order of arrival.
 """
 
 from __future__ import annotations
@@ -29,9 +28,7 @@ class CampaignProgress:
 
     Attributes:
         robots_done: Number of robots that are complete or failed.
-        robots: Number of robots.
         chunks_done: Number of chunks that are finished or no longer needed.
-        chunks: Number of chunks.
         chunks_kept: Number of finished chunks from an earlier run.
         failures: Number of robots so far that disagree or could not be checked.
         label: Name of the current robot.
@@ -46,18 +43,14 @@ class CampaignProgress:
     label: str
 
 
-#: Function that is called with the progress after each chunk.
 Progress = Callable[[CampaignProgress], None]
 
 
 class ResultCollector:
     """The answers of a run, by robot and chunk.
 
-    Args:
-        subjects: The robots.
-        cut: The division of their samples into chunks.
-        parts: The range of chunks to run for each robot.
-        progress: Callback, called before the work and after each answer.
+    `parts` is the range of chunks to run for each robot. The callback `progress` is called before the work
+    and after each answer.
     """
 
     def __init__(
@@ -73,16 +66,11 @@ class ResultCollector:
         self._chunks_done = self._from_earlier = self._robots_done = self._failures = 0
 
     def begin(self) -> None:
-        """Report the progress at the start of the work."""
         if self._progress is not None:
             self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
 
     def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
-        """Add an answer.
-
-        `kept` is True if an earlier run computed the answer. The chunks of earlier runs are counted
-        separately.
-        """
+        """Add an answer, and report the progress; `kept` is True if an earlier run computed the answer."""
         robot = self._robots[task.robot]
         was_over, had_failed, before = robot.over, robot.has_failed, robot.done
         robot.enter(task.chunk.index, found)
@@ -94,7 +82,6 @@ class ResultCollector:
             self._progress(self.standing(self._subjects[task.robot].label))
 
     def standing(self, label: str = "") -> CampaignProgress:
-        """Return the progress so far; `label` is the name of the current robot."""
         return CampaignProgress(
             robots_done=self._robots_done,
             robots=sum(bool(robot.part) for robot in self._robots),
@@ -115,7 +102,6 @@ class ResultCollector:
                 yield index
 
     def give_up(self, found: Failure) -> None:
-        """Record a failure for every robot that is not complete."""
         for robot in self._robots:
             if not robot.over:
                 robot.failures[len(self._cut)] = found
@@ -128,8 +114,6 @@ class ResultCollector:
 
 
 class _Robot:
-    """The answers for one robot."""
-
     def __init__(self, part: range) -> None:
         self.part = part
         self.failures: dict[int, Failure] = {}
@@ -172,8 +156,7 @@ class _Robot:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        # Leave out results of chunks after the failed chunk. Which of these chunks were computed depends on
-        # the speed of the workers.
+        # Results after the failed chunk are left out: their number depends on the speed of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._runs if run.start < last]
@@ -204,10 +187,7 @@ class _Robot:
 def _verdict(
     tallies: dict[Key, Tally], portrait: RobotSummary, failure: Failure | None, samples: int, wanted: int
 ) -> tuple[Verdict, list[str]]:
-    """Return the verdict on a robot and all reasons for it.
-
-    A disagreement takes precedence over every other verdict.
-    """
+    """Return the verdict on a robot and all reasons for it; a disagreement takes precedence."""
     disagreements = [*_outside(tallies), *portrait.disagreements]
     verdict, reasons = Verdict.VERIFIED, list[str]()
     if failure is not None:

@@ -27,14 +27,13 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 
-#: Maximum number of bytes of one array in a block of frames. About ten arrays of this size exist at a time.
+#: Maximum number of bytes of one array in a block of frames.
+#: About ten arrays of this size exist at a time.
 BLOCK_BYTES = 32 * 2**20
 
 
 @dataclass(frozen=True, slots=True)
 class SecondOracleModel:
-    """A second oracle besides Pinocchio, and its model of the robot."""
-
     library: OracleLibrary
     oracle: Oracle
 
@@ -42,7 +41,7 @@ class SecondOracleModel:
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> ThreeSides:
         """Compare the results of three libraries, for the frames or joints of a block."""
-        answers = block.clock.second_oracle(row.ask, self.oracle, block.asked(row, reference))
+        answers = block.clock.timed("second", row.ask, self.oracle, block.asked(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
         )
@@ -59,18 +58,9 @@ def tallies(
     clock: Clock,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, Tally]:
-    """Compare the results for all frames and joints of a robot with the oracle's results.
+    """Return the error statistics of each quantity of a robot in each reference frame.
 
-    Args:
-        robot: The robot.
-        oracle: Pinocchio's model of it.
-        x: The samples.
-        first_sample: Index of the first sample.
-        clock: Receives the computing times.
-        second: The second oracle; None: compare with Pinocchio only.
-
-    Returns:
-        The error statistics of each quantity in each reference frame.
+    `oracle` is Pinocchio's model. The clock receives the computing times.
     """
     found: dict[Key, Tally] = {}
     work = robot, oracle, x, first_sample, clock
@@ -87,18 +77,13 @@ def frame_bytes(samples: int, nv: int) -> int:
 
 
 def blocks(count: int, size: int) -> Iterator[slice]:
-    """Divide `count` items into slices of at most `BLOCK_BYTES`, if each item has `size` bytes.
-
-    Return at least one slice.
-    """
+    """Divide `count` items of `size` bytes into slices of at most `BLOCK_BYTES`; yield at least one slice."""
     most = max(1, BLOCK_BYTES // size)
     for start in range(0, max(1, count), most):
         yield slice(start, min(count, start + most))
 
 
 class _Work:
-    """A batch of samples of a robot, and the error statistics of its comparisons."""
-
     def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> None:
         self.robot, self.oracle, self.x, self.first, self.clock = robot, oracle, x, first_sample, clock
         rows = zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True)
@@ -109,10 +94,7 @@ class _Work:
 
 
 class _Block(_Work):
-    """The comparisons of urdfkin with the oracles for a block of frames.
-
-    The block includes each joint whose child link is in the block.
-    """
+    """The comparisons for a block of frames, and for each joint whose child link is in the block."""
 
     def __init__(
         self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock, frames: slice
@@ -121,13 +103,12 @@ class _Block(_Work):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # The robot caches the compiled tree of all its frames. For a block of frames, the tree is compiled
-        # again.
+        # The robot caches the compiled tree of all frames only.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
-        # The Jacobian of the frame at a joint is the Jacobian of the joint's child link. In the list of
-        # frames, the links come first, beginning with the root.
+        # The Jacobian of the frame at a joint is the Jacobian of the joint's child link.
+        # In the list of frames, the links come first, beginning with the root.
         moving = [i + 1 for i, joint in enumerate(tree.joints) if joint.kind.nv]
         joints = slice(bisect_left(moving, frames.start), bisect_left(moving, frames.stop))
         self.joint_rows = [link - frames.start for link in moving[joints]]
@@ -143,18 +124,17 @@ class _Block(_Work):
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
-                ours = self.clock.ours(row.ours, self.plan, inputs, reference)
+                ours = self.clock.timed("urdfkin", row.ours, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
                 yield self._compare(row, reference, ours, bound, second)
                 for joint in joints:
                     yield self._compare(joint, reference, ours[:, self.joint_rows], self.part(bound), second)
 
     def part(self, bound: Bound) -> Bound:
-        """Return the bounds of the block's joints; `bound` contains the bounds of the block's frames."""
+        """Return the bounds of the block's joints, from the bounds of the block's frames."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def asked(self, row: Quantity, reference: Reference | None) -> QueryBatch:
-        """Return the query to the oracle: the frames or joints, and the inputs that the quantity needs."""
         joints = row.of == "joints"
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a
@@ -170,7 +150,7 @@ class _Block(_Work):
         second: SecondOracleModel | None,
     ) -> tuple[Key, Tally]:
         names = self.joint_names if row.of == "joints" else self.frames
-        theirs = self.clock.theirs(row.ask, self.oracle, self.asked(row, reference))
+        theirs = self.clock.timed("pinocchio", row.ask, self.oracle, self.asked(row, reference))
         found = self.tally(ours, theirs, bound, names)
         if second is not None:
             found = replace(found, three_sides=second.three_sides(self, row, reference, ours, theirs))
@@ -188,7 +168,7 @@ class _Screws(_Work):
         robot, x = self.robot, self.x
         tree = freed(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.clock.theirs(SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(1, 2)
+        theirs = self.clock.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):
@@ -202,7 +182,7 @@ class _Screws(_Work):
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
         size = magnitudes(plan, q, *still, STILL_STATE)
-        J = self.clock.ours(SCREWS.ours, plan, (q,), Reference.WORLD)
+        J = self.clock.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
@@ -213,10 +193,7 @@ class _Screws(_Work):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return the configuration of the tree in which mimic joints are independent.
-
-    The values of the mimic joints follow their mimic rules.
-    """
+    """Return configurations of the tree `free`, whose former mimic joints have the values of their rules."""
     spread = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -1,10 +1,9 @@
 """Find common mistakes that explain a wrong result of a user's function.
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
-and joints in another order. The module makes each mistake deliberately in urdfkin's own results. If urdfkin's
-results with the mistake agree with the user's results, the mistake is named. They agree if the mistake makes
-the largest difference at least a thousand times smaller. If several mistakes lead to the same results, all of
-them are named.
+and joints in another order. The module makes each mistake deliberately in urdfkin's own results. A mistake is
+named if it makes the largest difference from the user's results at least a thousand times smaller. If several
+mistakes lead to the same results, all of them are named.
 """
 
 from __future__ import annotations
@@ -26,21 +25,21 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake is named if at most this fraction of the difference remains after urdfkin makes the same mistake.
+#: A mistake is named if at most this fraction of the difference remains.
+#: The remaining difference is that between the user's results and urdfkin's results with the mistake.
 EXPLAINED = 1e-3
 #: Largest number of explanations that are named.
 _MOST = 3
-#: Number of configurations that are used to test whether two joints are exchanged.
+#: Number of configurations in the test whether two joints are exchanged.
 _FEW = 4
-#: Differences are divided by their scale. A scale that is 0 is replaced by the largest scale times this
-#: number.
+#: Differences are divided by their scale.
+#: A scale of 0 is replaced by the largest scale times this number.
 _LEAST = 1e-9
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
 #: Inputs of a function: q, q and v, or q, v and a.
-#: A mistake is simulated with changed inputs.
-#: From these inputs, urdfkin computes the results that a function with this mistake returns.
+#: From changed inputs, urdfkin computes the results of a function with a mistake.
 Inputs = tuple[FloatArray, ...]
 
 
@@ -63,10 +62,9 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the fraction of the difference that remains for predicted results.
+        """Return the fraction of the first n differences that remains after a simulated mistake.
 
-        `predicted` contains urdfkin's first n results with a simulated mistake. The fraction is 0 if
-        `predicted` equals the user's results.
+        The fraction is 0 if urdfkin's results with the mistake (`predicted`) equal the user's results.
         """
         scale = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
         with np.errstate(all="ignore"):
@@ -75,7 +73,7 @@ class Diagnosis:
             return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
 
     def is_expected(self, predicted: FloatArray) -> bool:
-        """Return whether the predicted results equal the expected ones, so that the mistake has no effect."""
+        """Return whether a mistake has no effect: the predicted results equal the expected ones."""
         size = np.maximum(self.scale, _LEAST * self.scale.max(initial=_LEAST))
         return bool((np.abs(predicted - self.expected) <= _LEAST * size).all())
 
@@ -87,8 +85,8 @@ class Diagnosis:
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     """Return at most three sentences about the mistakes that explain the results; the list may be empty.
 
-    Each mistake is also combined with exchanged linear and angular halves of the six-vectors. A mistake
-    combined with exchanged halves is named only if no single mistake explains the results.
+    Each mistake is also combined with exchanged linear and angular halves of the six-vectors. Such a
+    combination is named only if no single mistake explains the results.
     """
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.exchanged_halves
@@ -111,8 +109,7 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     return []
 
 
-#: A common mistake: a sentence that describes the mistake, and a function that returns urdfkin's results with
-#: this mistake.
+#: A sentence about a common mistake, and a function that returns urdfkin's results with this mistake.
 Mistake = tuple[str, Callable[[], FloatArray]]
 
 
@@ -120,12 +117,7 @@ Mistake = tuple[str, Callable[[], FloatArray]]
 class Mistakes:
     """The usual mistakes of a function that computes one quantity of one frame.
 
-    Attributes:
-        robot: The robot.
-        row: The quantity.
-        frame: The frame.
-        reference: The reference frame; None for a placement.
-        conversion: The function's convention; None for urdfkin's.
+    `conversion` belongs to the function's convention; None: the convention is urdfkin's.
     """
 
     robot: Robot
@@ -136,10 +128,7 @@ class Mistakes:
 
     @property
     def exchanged_halves(self) -> str:
-        """A sentence for the mistake that the linear and the angular rows are exchanged.
-
-        The sentence is empty if the quantity has no linear and angular halves.
-        """
+        """A sentence about exchanged linear and angular rows; empty for a quantity without these halves."""
         first = "linear" if self._angular_first else "angular"
         return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
 
@@ -269,16 +258,13 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _turning(self) -> list[tuple[int, int]]:
-        """Return the indices in q and in v of each joint whose coordinate is a single angle.
-
-        The indices are those of the function's convention.
-        """
+        """Return the indices in the function's q and v of each joint whose coordinate is a single angle."""
         return [(q, v) for _, q, v, turns in self._axes() if turns]
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return a tuple (name, index in q, index in v, is an angle) for each joint with one coordinate.
+        """Return (name, index in q, index in v, is an angle) for each joint with one coordinate.
 
-        The indices are indices in the function's convention.
+        The indices are those of the function's convention.
         """
         tree = self.robot.tree
         found = []
@@ -295,10 +281,7 @@ class Mistakes:
 
     @staticmethod
     def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Return the inputs with the values of some joints multiplied by a factor.
-
-        The factor applies to q only, or to q, v and a.
-        """
+        """Return the inputs with the values of some joints, in the first inputs only, times a factor."""
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
             x[:, [pair[min(k, 1)] for pair in at]] *= factor
@@ -309,7 +292,7 @@ class Mistakes:
         mimics = [joint for joint in tree.joints if joint.mimic]
         if not mimics or self.conversion is not None:
             return
-        from urdfkin.robot.loading import load  # noqa: PLC0415  few robots need it
+        from urdfkin.robot.loading import load  # noqa: PLC0415  few robots need this import
 
         lock = dict(self.robot.origin.lock)
         free = load(self.robot.urdf, mimic=False, root_joint=self.robot.root_joint, lock=lock, verify=False)
@@ -403,7 +386,7 @@ class Mistakes:
         """Yield the joint orders of other tools, if they are permutations of urdfkin's order."""
         if self.conversion is not None:
             return
-        from urdfkin.model.conventions import BUILT_IN  # noqa: PLC0415  few functions need it
+        from urdfkin.model.conventions import BUILT_IN  # noqa: PLC0415  few functions need this import
 
         seen = {tuple(range(self.robot.nq))}
         for name in BUILT_IN:
@@ -423,7 +406,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """For each other link, yield the mistake "the function computes this link instead of the frame"."""
+        """Yield the mistake of computing another link, for each other link."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return
@@ -437,10 +420,7 @@ class Mistakes:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield mistakes that affect only some columns of a Jacobian.
-
-    The columns without this mistake may be right, or may be wrong for another reason.
-    """
+    """Yield mistakes of single columns of a Jacobian; the other columns may be right or wrong."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names

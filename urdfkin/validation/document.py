@@ -1,7 +1,4 @@
-"""Define the types of the JSON document of a validation.
-
-The document's schema is generated from these types.
-"""
+"""Define the types of the JSON document of a validation; its schema is generated from these types."""
 
 from __future__ import annotations
 
@@ -10,7 +7,6 @@ from typing import Annotated, Literal, NotRequired, TypedDict
 from urdfkin.system.documents import Count, Header, Layout, Matrix, Sha256, Size, of_length, says
 from urdfkin.validation.outcome import OUTCOMES, Outcome, outcome
 
-#: A disagreement.
 Units = Annotated[
     Size | None,
     says(
@@ -449,7 +445,7 @@ class Document(Header):
     robots: Annotated[list[Robot], says("Reports of the robots in the requested order.")]
 
 
-#: The layout of the document. Entries may be added, but no entry is removed or changes its meaning.
+#: Layout of the document; entries may be added, but none is removed or changes its meaning.
 VALIDATION = Layout(
     "urdfkin-validation/1",
     Document,

@@ -1,12 +1,8 @@
 """Engines that run chunks, and the queue that distributes chunks among workers.
 
-An engine runs tasks and passes each answer to a callback once, in any order. The collector sorts the answers
-by robot and chunk before it adds them, so no result depends on the engine. If a robot has failed, an engine
-may skip the remaining chunks of this robot. The engine must run all other chunks. Tasks are created only when
-they are needed, so a million tasks take no memory.
-
-The engines here run in this process, or on an executor with the interface of `concurrent.futures`.
-`urdfkin.validation.worker_processes` has an engine of local processes.
+An engine runs tasks and passes each answer to a callback once, in any order. The collector sorts the answers,
+so no result depends on the engine. If a robot has failed, an engine may skip the remaining chunks of this
+robot, but no others. Tasks are created only when they are needed, so a million tasks take no memory.
 
 Each worker gets its own robot, so that only one worker has to read this robot. If no robot is waiting, a free
 worker takes chunks of the robot with the most chunks left.
@@ -54,12 +50,7 @@ class Row:
 
 
 class WorkQueue:
-    """Distribute tasks among workers.
-
-    Args:
-        work: The tasks of each robot.
-        shared: Whether several workers may work on the same robot.
-    """
+    """Distribute tasks among workers; if `shared`, several workers may work on the same robot."""
 
     def __init__(self, work: Work, *, shared: bool = True) -> None:
         self._waiting: Iterator[Row] = map(Row, work)
@@ -68,10 +59,7 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, Row] | None:
-        """Return the first task of the next robot, and the robot's other tasks, for an idle worker.
-
-        Return None if no task is left.
-        """
+        """Return a task for an idle worker, preferably of a new robot, and the robot's other tasks."""
         for row in self._waiting:
             self._begun.append(row)
             if (task := self.next(row)) is not None:
@@ -91,13 +79,13 @@ class WorkQueue:
         return task
 
     def put_back(self, task: Task, row: Row) -> None:
-        """Put a task back into its robot's remaining tasks (`row`), so that another worker can run it."""
+        """Put a task back into its robot's remaining tasks, so that another worker can run it."""
         row.put_back(task)
         self._begun.remove(row)
         self._waiting = chain([row], self._waiting)
 
     def end(self, robot: int) -> None:
-        """Remove a robot from the queue; its remaining tasks are not returned any more."""
+        """Remove a robot from the queue."""
         self._ended.add(robot)
 
     def withdraw(self, robot: int) -> list[Task]:
@@ -106,29 +94,27 @@ class WorkQueue:
         return [task for row in self._begun if row.robot == robot for task in row]
 
 
-#: Maximum number of chunks in an executor's queue: enough for many workers, few enough to save memory.
+#: Maximum number of chunks in an executor's queue.
+#: This number is enough for many workers, and small enough to save memory.
 IN_FLIGHT = 512
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A chunk of samples of one robot, and the index of this robot in the run."""
-
     robot: int
     chunk: Chunk
 
 
 #: The tasks of each robot, in the order of its chunks.
 Work = Iterable[Iterable[Task]]
-#: Callback that receives the answer of a task. The callback is called at most once for each task.
+#: Callback that receives the answer of a task, at most once for each task.
 Enter = Callable[[Task, Answer], None]
 
 
 class Engine(Protocol):
-    """Interface of an engine.
+    """Interface of an engine; an exception from `run` ends the validation.
 
-    An exception from `run` ends the validation. Answers that were passed to the callback before the exception
-    stay in the report.
+    Answers that were passed to the callback before the exception stay in the report.
     """
 
     def run(self, work: Work, enter: Enter) -> None:
@@ -136,10 +122,7 @@ class Engine(Protocol):
 
 
 class SerialEngine:
-    """Engine that runs one chunk after another in this process."""
-
     def run(self, work: Work, enter: Enter) -> None:
-        """Run the tasks in their order."""
         for tasks in work:
             for task in tasks:
                 found = answer(task.chunk)
@@ -194,16 +177,14 @@ def _result(future: Future[Answer]) -> Answer:
 
 
 def lost(what: str, error: Exception) -> Failure:
-    """Return the failure of a robot with a chunk that could not be run, or whose answer was lost."""
     message = " ".join(str(error).split()) or "no message"
     return Failure(Verdict.NOT_VERIFIED, f"{what}: {type(error).__name__}: {message}", passing=True)
 
 
-#: Reasons that the report states if a robot crashed its process.
+#: Reasons in the report for a robot that crashed its process.
 DIED = "the process that validated the robot crashed"
-DIED_TWICE = "the process that validated the robot crashed twice; the second time it computed nothing else"
+DIED_TWICE = "the process that validated the robot crashed twice; the second process computed nothing else"
 
 
 def died(subject: RobotInput, how: str, cause: str) -> Failure:
-    """Return the answer for a robot that crashed its process."""
     return Failure(Verdict.NOT_VERIFIED, f"{subject.label}: {how}: found {cause}")

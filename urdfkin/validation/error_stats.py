@@ -1,14 +1,11 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
-A `Tally` contains the statistics of one quantity in one reference frame. Two tallies can be added if they
-belong to different samples. The addition is commutative and associative, so the sum does not depend on the
-division of the samples into chunks. A sum of two tallies keeps the worse of the two worst cases. If both are
-equally bad, the sum keeps the case with the smaller sample number.
+The addition of two tallies is commutative and associative, so the sum does not depend on the division of the
+samples into chunks. If two worst cases are equally bad, the sum keeps the one with the smaller sample number.
 
-With a second oracle, `ThreeSides` compares three results: urdfkin's, Pinocchio's and the second oracle's.
-Each of the three pairs of libraries has its own bound. Two results agree if their difference lies within the
-bound of their pair. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two
-pairs. If two results agree and the third one agrees with neither of them, the third one is the outlier.
+With a second oracle, `ThreeSides` compares three results. Each of the three pairs of libraries has its own
+bound. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two
+results agree and the third one agrees with neither of them, the third one is the outlier.
 """
 
 from __future__ import annotations
@@ -53,12 +50,9 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class ThreeSides:
-    """Comparison of three libraries for one quantity in one reference frame.
-
-    Several comparisons can be added.
+    """Comparison of urdfkin, Pinocchio and a second oracle (`by`) for one quantity in one reference frame.
 
     Attributes:
-        by: Name of the second oracle.
         urdfkin: urdfkin compared with the second oracle.
         pinocchio: Pinocchio compared with the second oracle.
         alone: For each library of `SIDES`, the number of results in which only this library differs from the
@@ -84,12 +78,10 @@ class ThreeSides:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the entry of a report."""
         return asdict(self) | {"alone": dict(zip(SIDES, self.alone, strict=True))}
 
 
 def plus(first: ThreeSides | None, second: ThreeSides | None) -> ThreeSides | None:
-    """Return the sum of two comparisons; None is an empty comparison."""
     return first if second is None else second if first is None else first + second
 
 
@@ -98,13 +90,8 @@ def three_sides(
 ) -> ThreeSides:
     """Compare three results (n, frames, ...) with each other.
 
-    Args:
-        by: Name of the second oracle.
-        ours: Results of urdfkin.
-        pinocchios: Results of Pinocchio.
-        second_oracles: Results of the second oracle.
-        first: Bound on the difference between urdfkin and Pinocchio.
-        second: Bound on the difference between urdfkin and the second oracle.
+    The bound `first` limits the difference between urdfkin and Pinocchio, `second` the difference between
+    urdfkin and the second oracle.
     """
     if not ours.size:
         return ThreeSides(by, Pair(), Pair())
@@ -130,11 +117,7 @@ def three_sides(
 
 
 def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArray, FloatArray]:
-    """Return two arrays (n, frames) of disagreements.
-
-    The first array contains the ratios of disagreement to bound. The second array contains the disagreements
-    in eps * scale.
-    """
+    """Return two arrays (n, frames): ratios of disagreement to bound, and disagreements in eps * scale."""
     units = worst_of_each(one, other, bound.scale, 2)
     share: FloatArray = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
     return share, units
@@ -147,11 +130,10 @@ def _together(first: Bound, second: Bound) -> Bound:
         return Bound(size / second.k, second.k)
 
 
-#: Edges of the histogram of disagreements, in eps * scale: ten bins a decade from 0.001 to 100,000.
+#: Edges of the histogram of disagreements, in eps * scale: ten bins per decade from 0.001 to 100,000.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
 
 
-#: The inputs q, v and a of one sample.
 Inputs = tuple[list[float], list[float], list[float]]
 
 
@@ -177,14 +159,12 @@ class Tally:
         failed: Number of results outside their bound.
         worst: The largest disagreement, in eps * scale.
         share: The largest ratio of a disagreement to its bound.
-        histogram: (82,) number of results in each bin of the histogram. The first bin contains results below
-            the first of `HISTOGRAM_EDGES`, and the last bin contains results above the last edge. Each other
-            bin is between two adjacent edges.
+        histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between two
+            adjacent edges, and above the last edge.
         by_frame: The largest disagreement of each frame, in the robot's order.
         case: The sample with the largest ratio.
         bounds: The smallest and the largest bound of all results, in eps * scale. The bound for a frame grows
             with the number of joints on the path to the frame.
-        three_sides: The comparison with a second oracle; None without one.
     """
 
     results: int
@@ -198,9 +178,7 @@ class Tally:
     three_sides: ThreeSides | None = None
 
     def __add__(self, other: Tally) -> Tally:
-        first, second = self.case, other.case
-        if first is None or (second is not None and _before(second, first)):
-            first = second
+        cases = [case for case in (self.case, other.case) if case is not None]
         return Tally(
             self.results + other.results,
             self.failed + other.failed,
@@ -208,31 +186,25 @@ class Tally:
             max(self.share, other.share),
             tuple(a + b for a, b in zip(self.histogram, other.histogram, strict=True)),
             tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
-            first,
+            max(cases, key=lambda case: (case.share, -case.sample), default=None),
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
             plus(self.three_sides, other.three_sides),
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return the common statistics of the frames in `self` and the frames in `other`.
-
-        The two tallies must belong to the same samples.
-        """
+        """Return the statistics of the frames in `self` and `other` together, for the same samples."""
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements.
-
-        Its error is at most the width of a histogram bin, 26 %.
-        """
+        """Return a percentile of the disagreements; its error is at most a histogram bin, 26 %."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of the values in a histogram; the accuracy of the result is the width of a bin."""
+    """Return a percentile of the values in a histogram, to the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -241,12 +213,7 @@ def percentile(
 
 
 def histogram_bin(units: float, edges: Sequence[float] | FloatArray) -> int:
-    """Return the index of the histogram bin that counts a disagreement."""
     return int(np.searchsorted(edges, units, side="right"))
-
-
-def _before(case: WorstCase, other: WorstCase) -> bool:
-    return (case.share, -case.sample) > (other.share, -other.sample)
 
 
 def tally(
@@ -257,15 +224,10 @@ def tally(
     first_sample: int,
     inputs: Sequence[Inputs],
 ) -> Tally:
-    """Compare results of urdfkin and Pinocchio.
+    """Compare results (n, frames, ...) of urdfkin and Pinocchio.
 
-    Args:
-        ours: (n, frames, ...) results of urdfkin.
-        theirs: (n, frames, ...) results of Pinocchio.
-        bound: Bound whose scale and k can be broadcast to the shape of the results.
-        frames: A name for each frame.
-        first_sample: Index of the first of the n samples.
-        inputs: q, v and a of each sample, for the worst case.
+    The scale and k of the bound can be broadcast to the shape of the results. `inputs` are q, v and a of each
+    sample, for the worst case.
     """
     n, count = ours.shape[:2]
     if not ours.size:

@@ -1,9 +1,8 @@
 """Compare a user's function with urdfkin and the oracle, within the derived bound.
 
 The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
-function at random configurations, at the zero configuration and at the joint limits. First, the module
-compares urdfkin's results at these configurations with the oracle's results. If urdfkin and the oracle agree,
-but the function disagrees with urdfkin, the error is in the function.
+function at random configurations, at the zero configuration and at the joint limits. If urdfkin and the
+oracle agree there, but the function disagrees with urdfkin, the error is in the function.
 """
 
 from __future__ import annotations
@@ -40,24 +39,19 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
-#: Configurations are computed in batches of `_AT_A_TIME`. A diagnosis uses `_DIAGNOSED` configurations.
+#: Number of configurations in a batch.
 _AT_A_TIME = 256
+#: Number of configurations in a diagnosis.
 _DIAGNOSED = 48
-#: Largest number of exceptions and wrong shapes that are stored with their message.
+#: Largest number of exceptions and wrong shapes with a stored message.
 _KEPT = 5
-#: If a function's results differ from urdfkin's by this relative amount or less, the diagnosis is "the
-#: function rounds to single precision".
+#: A relative difference up to this number is explained by rounding to single precision.
 _SINGLE = 1e-5
 
 
 @dataclass(frozen=True)
 class FunctionError:
-    """An exception of the user's function, or a result that is not an array of the right shape.
-
-    Attributes:
-        sample: Index of the configuration.
-        message: The text of the exception, or a text that states the wrong shape.
-    """
+    """An exception of the user's function, or a result that is not an array of the right shape."""
 
     sample: int
     message: str
@@ -70,8 +64,6 @@ class WorstResult:
     Attributes:
         sample: Index of the configuration.
         inputs: q, or q and v, or q, v and a, as the function received them.
-        found: The function's result.
-        expected: urdfkin's result.
         bound: Largest allowed difference of each number.
         replay: A command or a line of Python that computes the expected result.
     """
@@ -204,12 +196,14 @@ class FunctionCheck(Displayable):
         if self.compared:
             parts.append(
                 f"Largest difference from urdfkin: {self.eps_scale:.3g} eps*scale, {self.share:.3g} of the"
-                f" bound times {self.factor:g}."
+                f" allowed difference (the bound times {self.factor:g})."
             )
         if self.oracle_share is None:
             parts.append("urdfkin's results were NOT checked: no oracle can check this robot.")
         elif self.compared:
-            parts.append(f"Largest difference from {self.oracle}: {self.oracle_share:.3g} of the same bound.")
+            parts.append(
+                f"Largest difference from {self.oracle}: {self.oracle_share:.3g} of the allowed difference."
+            )
         if self.errors:
             parts.append(f"{self.errors} configurations without a result of the right shape:")
             parts += [f"  sample {error.sample}: {error.message}" for error in self.first_errors]
@@ -312,7 +306,9 @@ def verify_function(
     row = quantity_of(quantity)
     if row.of != "frames" or row is ACCELERATION_BREAKDOWN:
         raise InputError("a function cannot be compared with this quantity", found=quantity)
-    how = _How(
+    run = _Run(
+        function,
+        robot,
         row,
         frame or robot.tip_frame,
         None if not row.referred else Reference.of(reference),
@@ -322,24 +318,10 @@ def verify_function(
         as_bool(batch, "batch"),
         options,
     )
-    if not how.factor > 0.0:
+    if not run.factor > 0.0:
         raise InputError("factor must be positive", found=safe_repr(factor))
-    conversion = None if convention is None else robot.convention(convention)
-    return _Run(function, robot, conversion, how).check()
-
-
-@dataclass(frozen=True)
-class _How:
-    """The arguments of `verify_function`, validated."""
-
-    row: Quantity
-    frame: str
-    reference: Reference | None
-    samples: int
-    seed: int
-    factor: float
-    batch: bool
-    options: dict[str, Any]
+    run.conversion = None if convention is None else robot.convention(convention)
+    return run.check()
 
 
 @dataclass
@@ -371,31 +353,36 @@ class _Compared:
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Return the differences between `found` and `other`, in units of eps * scale.
-
-        A difference that is not finite becomes inf.
-        """
+        """Return the differences between `found` and `other` in eps * scale; inf if not finite."""
         with np.errstate(all="ignore"):
             units = disagreement(self.found, other, Bound(self.scale, self.k))
         return np.where(np.isfinite(units), units, np.inf)
 
 
+@dataclass
 class _Run:
-    """One check of a function."""
+    """One check of a function; the attributes are the arguments of `verify_function`, validated."""
 
-    def __init__(
-        self, function: Callable[..., object], robot: Robot, conversion: Conversion | None, how: _How
-    ) -> None:
-        self.function, self.robot, self.conversion, self.how = function, robot, conversion, how
-        self.recorder = _Recorder(robot.verifier)
-        self.recording = copy(robot)
+    function: Callable[..., object]
+    robot: Robot
+    row: Quantity
+    frame: str
+    reference: Reference | None
+    samples: int
+    seed: int
+    factor: float
+    batch: bool
+    options: dict[str, Any]
+    conversion: Conversion | None = None
+
+    def __post_init__(self) -> None:
+        self.recorder, self.recording = _Recorder(self.robot.verifier), copy(self.robot)
         self.recording.verifier = cast("Verifier", self.recorder)
-        self.nv = robot.nv if conversion is None else conversion.nv
 
     def check(self) -> FunctionCheck:
-        row, how, robot = self.how.row, self.how, self.robot
-        drawn = draw(robot.tree, how.samples, np.random.default_rng(how.seed), with_special=True)
-        total = _Total(row, how.factor, self._row_names(), self._column_names())
+        robot = self.robot
+        drawn = draw(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
+        total = _Total(self.row, self.factor, self._row_names(), self._column_names())
         checked = robot.verifier.cannot(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _AT_A_TIME):
             part = slice(first, first + _AT_A_TIME)
@@ -403,7 +390,7 @@ class _Run:
         return self._result(total, len(drawn.q), checked)
 
     def _result(self, total: _Total, samples: int, checked: bool) -> FunctionCheck:
-        how, robot = self.how, self.robot
+        robot = self.robot
         diagnoses: tuple[str, ...] = ()
         if total.share > 1.0 or total.errors:
             diagnoses = tuple(self._diagnoses(total))
@@ -414,14 +401,14 @@ class _Run:
         return FunctionCheck(
             getattr(self.function, "__name__", type(self.function).__name__),
             robot.name,
-            how.row.name,
-            how.frame,
-            None if how.reference is None else how.reference.name.lower(),
+            self.row.name,
+            self.frame,
+            None if self.reference is None else self.reference.name.lower(),
             None if self.conversion is None else self.conversion.convention.name,
             robot.certificate().oracle if checked else "",
             samples,
             total.compared,
-            how.factor,
+            self.factor,
             total.eps_scale,
             total.share,
             total.oracle_share if checked else None,
@@ -445,13 +432,13 @@ class _Run:
         ours = self._ours(inputs)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DegreesWarning)  # a diagnosis tries q in degrees
-            found = self._method(self.robot, ours, frame or self.how.frame, reference, verify=False)
+            found = self._method(self.robot, ours, frame or self.frame, reference, verify=False)
             return self._converted(ours, found, frame, reference)
 
     def _compared(self, first: int, drawn: tuple[FloatArray, ...], total: _Total, checked: bool) -> _Compared:
-        row = self.how.row
+        row = self.row
         ours = drawn[: len(row.inputs)]
-        result = self._method(self.recording, ours, self.how.frame, None, verify=checked)
+        result = self._method(self.recording, ours, self.frame, None, verify=checked)
         _, call, _ = self.recorder.calls[row.name]
         flat = result[:, None]
         part = call.part(slice(0, call.n))
@@ -462,21 +449,17 @@ class _Run:
         else:
             bound = bound_of(row, part)
         scale = np.broadcast_to(bound.scale, flat.shape)[:, 0]
-        k = result_k(bound, flat.shape[:2])[:, 0] * self.how.factor
+        k = result_k(bound, flat.shape[:2])[:, 0] * self.factor
         inputs: tuple[FloatArray, ...] = ours
         if self.conversion is not None:
             inputs = _tuple(self.conversion.to(*ours))
             scale = self._converted_scale(ours, scale)
-            k = k + self._rounding_of_the_conversion(ours[0]) * self.how.factor
+            k = k + self._rounding_of_the_conversion(ours[0]) * self.factor
         expected = self._converted(ours, result)
-        compared = _Compared(first, inputs, [], expected, expected, scale, k, None)
-        found = self._called(inputs, expected.shape[1:], first, total, compared.good)
-        good = compared.good
-        compared.found, compared.expected = found, expected[good]
-        compared.scale, compared.k = scale[good], k[good]
+        found, good = self._called(inputs, expected.shape[1:], first, total)
         if theirs is not None:
-            compared.theirs = self._converted(ours, np.asarray(theirs)[:, 0])[good]
-        return compared
+            theirs = self._converted(ours, np.asarray(theirs)[:, 0])[good]
+        return _Compared(first, inputs, good, found, expected[good], scale[good], k[good], theirs)
 
     def _method(
         self,
@@ -487,12 +470,10 @@ class _Run:
         *,
         verify: bool,
     ) -> FloatArray:
-        how = self.how
-        named = (
-            {} if how.reference is None else {"reference": how.reference if reference is None else reference}
-        )
-        method = getattr(robot, how.row.method)
-        found: FloatArray = method(*ours, frame=frame, verify=verify, **named, **how.options)
+        reference = self.reference if reference is None else reference
+        named = {} if self.reference is None else {"reference": reference}
+        method = getattr(robot, self.row.method)
+        found: FloatArray = method(*ours, frame=frame, verify=verify, **named, **self.options)
         return found
 
     def _ours(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
@@ -507,17 +488,17 @@ class _Run:
     ) -> FloatArray:
         if self.conversion is None:
             return result
-        reference = self.how.reference if reference is None else reference
+        reference = self.reference if reference is None else reference
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
-        jacobian = partial(self.robot.jacobian, ours[0], frame or self.how.frame, reference, verify=False)
-        return self.conversion.result(self.how.row.name, ours, result, jacobian)
+        jacobian = partial(self.robot.jacobian, ours[0], frame or self.frame, reference, verify=False)
+        return self.conversion.result(self.row.name, ours, result, jacobian)
 
     def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Return the scale of the bound for a result after its conversion to the function's convention.
 
         Each number of the converted result is a sum of numbers in urdfkin's convention.
         """
-        conversion, name = self.conversion, self.how.row.name
+        conversion, name = self.conversion, self.row.name
         assert conversion is not None
         if name == "placement":
             return scale
@@ -544,42 +525,36 @@ class _Run:
         up to 2 eps |q|, and this matrix is a factor of each term of the result. The conversion of a base
         velocity by a matrix has at most 16 rounding errors.
         """
-        conversion, row = self.conversion, self.how.row
+        conversion, row = self.conversion, self.row
         assert conversion is not None
         if conversion.permutation is not None and conversion.rate_permutation is not None:
             return 0.0
         return 16.0 + 2.0 * row.factors * len(self.robot.tree.joints) * float(np.abs(q).max(initial=1.0))
 
     def _called(
-        self,
-        inputs: tuple[FloatArray, ...],
-        shape: tuple[int, ...],
-        first: int,
-        total: _Total,
-        good: list[int],
-    ) -> FloatArray:
-        """Return those results of the function that have the right shape; add their indices to `good`."""
-        n, found = len(inputs[0]), list[FloatArray]()
-        if self.how.batch:
+        self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
+    ) -> tuple[FloatArray, list[int]]:
+        """Return the function's results of the right shape, and their indices."""
+        n = len(inputs[0])
+        if self.batch:
             array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
-            good += range(n) if array is not None else ()
-            return np.zeros((0, *shape)) if array is None else array
+            return (np.zeros((0, *shape)), []) if array is None else (array, list(range(n)))
+        found = dict[int, FloatArray]()
         for k in range(n):
             array = _call(self.function, [x[k].copy() for x in inputs], shape, first + k, total, 1)
             if array is not None:
-                found.append(array)
-                good.append(k)
-        return np.array(found).reshape(len(found), *shape)
+                found[k] = array
+        return np.array(list(found.values())).reshape(len(found), *shape), list(found)
 
     # -- explanations --------------------------------------------------------------------------------
 
     def _diagnoses(self, total: _Total) -> Iterator[str]:
         if total.wrong_shapes and not total.compared:
-            words = _of_shape(next(iter(total.wrong_shapes)), total.shape)
-            if words:
-                yield words
+            shape = next(iter(total.wrong_shapes))
+            if len(shape) > 1 and shape == total.shape[::-1]:
+                yield f"the result is transposed: its shape is {shape} in place of {total.shape}"
             return
-        if not total.kept:
+        if (kept := total.kept) is None:
             return
         if total.not_finite:
             yield f"{total.not_finite} results are not finite"
@@ -587,38 +562,38 @@ class _Run:
         if total.eps_scale * EPS <= _SINGLE and math.isfinite(total.share):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
             yield (
-                f"all differences are below {total.eps_scale * EPS:.1g} of the terms' size, as rounding in"
-                f" {precision} precision leaves;"
-                f" factor={math.ceil(total.share * self.how.factor)} accepts them"
+                f"rounding in {precision} precision explains all differences: they are below"
+                f" {total.eps_scale * EPS:.1g} of the terms' size;"
+                f" factor={math.ceil(total.share * self.factor)} accepts them"
             )
             return
-        inputs, found, expected, scale = total.for_diagnosis()
-        mistakes = Mistakes(self.robot, self.how.row, self.how.frame, self.how.reference, self.conversion)
-        diagnosis = Diagnosis(inputs, found, expected, scale, self.expected)
-        yield from diagnose(mistakes, diagnosis)
+        mistakes = Mistakes(self.robot, self.row, self.frame, self.reference, self.conversion)
+        some = slice(_DIAGNOSED)
+        inputs = tuple(x[kept.good[some]] for x in kept.inputs)
+        case = Diagnosis(inputs, kept.found[some], kept.expected[some], kept.scale[some], self.expected)
+        yield from diagnose(mistakes, case)
 
     def _replay(self, values: tuple[FloatArray, ...]) -> str:
-        _, call, _ = self.recorder.calls[self.how.row.name]
+        _, call, _ = self.recorder.calls[self.row.name]
         one = copy(call)
         one.q, one.rates, one.shape, one.n = values[0][None], [x[None] for x in values[1:]], (1,), 1
-        return self.robot.verifier._replay(self.how.row, one, 0, self.how.frame)
+        return self.robot.verifier._replay(self.row, one, 0, self.frame)
 
     def _row_names(self) -> tuple[str, ...]:
-        row = self.how.row
+        row = self.row
         angular_first = self.conversion is not None and self.conversion.angular_first
         labels = row.labels[3:] + row.labels[:3] if angular_first and len(row.labels) == 6 else row.labels
-        return labels or tuple(f"row {k}" for k in range(row.own_shape(self.nv)[0]))
+        nv = (self.conversion or self.robot).nv
+        return labels or tuple(f"row {k}" for k in range(row.own_shape(nv)[0]))
 
     def _column_names(self) -> tuple[str, ...]:
-        if not self.how.row.columns:
+        if not self.row.columns:
             return ()
         return (self.conversion or self.robot).rate_names
 
 
 @dataclass
 class _Total:
-    """The comparison of all configurations so far."""
-
     row: Quantity
     factor: float
     row_names: tuple[str, ...]
@@ -639,13 +614,11 @@ class _Total:
         self.by_row, self.by_column = np.zeros(len(self.row_names)), np.zeros(len(self.column_names))
 
     def error(self, sample: int, message: str, configurations: int) -> None:
-        """Record an exception or a wrong shape."""
         self.errors += configurations
         if len(self.first_errors) < _KEPT:
             self.first_errors.append(FunctionError(sample, message))
 
     def add(self, part: _Compared) -> None:
-        """Add some configurations."""
         self.shape = part.expected.shape[1:]
         if not part.good:
             return
@@ -674,17 +647,6 @@ class _Total:
         if part.theirs is not None:
             self.oracle_share = max(self.oracle_share, float(part.shares(part.theirs).max(initial=0.0)))
 
-    def for_diagnosis(self) -> tuple[tuple[FloatArray, ...], FloatArray, FloatArray, FloatArray]:
-        """Return the data of some configurations for a diagnosis.
-
-        The data are the inputs, the function's results, urdfkin's results, and the scale.
-        """
-        assert self.kept is not None
-        good = np.array(self.kept.good[:_DIAGNOSED])
-        n = len(good)
-        inputs = tuple(x[good] for x in self.kept.inputs)
-        return inputs, self.kept.found[:n], self.kept.expected[:n], self.kept.scale[:n]
-
 
 def _call(
     function: Callable[..., object],
@@ -694,10 +656,7 @@ def _call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Return a copy of the function's result.
-
-    An exception or a wrong shape is added to `total`, and the result is then None.
-    """
+    """Return a copy of the function's result; None for an exception or a wrong shape, added to `total`."""
     try:
         given = np.asanyarray(function(*inputs))
         if np.ma.isMaskedArray(given) or given.dtype.kind not in "fiu":
@@ -713,12 +672,6 @@ def _call(
         total.error(sample, f"shape {found.shape}, expected {shape}", configurations)
         return None
     return found
-
-
-def _of_shape(found: tuple[int, ...], expected: tuple[int, ...]) -> str:
-    if len(found) > 1 and found == expected[::-1]:
-        return f"the result is transposed: its shape is {found} in place of {expected}"
-    return ""
 
 
 def _tuple(x: FloatArray | tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:

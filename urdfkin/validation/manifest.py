@@ -1,8 +1,7 @@
 """Define the manifest of a stored validation: its robots, samples and versions.
 
-The manifest defines the chunks and their keys. The key of a chunk is the sha256 of all data on which the
-numbers of the chunk depend. If the code, the text of the robot or the options change, the keys change too.
-Therefore, results of older code, texts or options are never reused.
+The manifest defines the chunks and their keys. The key of a chunk is the sha256 of all data on which its
+numbers depend. Therefore, results of older code, texts or options are never reused.
 """
 
 from __future__ import annotations
@@ -32,8 +31,6 @@ class Manifest:
 
     Attributes:
         robots: The origin of each robot and the sha256 of its text; empty if the text could not be read.
-        samples: Number of random configurations for each robot.
-        seed: Seed of the samples.
         provenance: Versions and digests of the computing code (`urdfkin.validation.results.provenance`).
         versions: Versions in the report.
         started: Start time, ISO 8601, UTC.
@@ -48,13 +45,12 @@ class Manifest:
 
     @classmethod
     def of(cls, subjects: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
-        """Return the manifest of a new validation, which is written before the first computation."""
         robots = tuple((subject.origin, subject.stamp) for subject in subjects)
-        return cls(robots, samples, seed, provenance(), _versions(subjects), started)
+        oracles = (subject.origin.oracle for subject in subjects)
+        return cls(robots, samples, seed, provenance(), versions(oracles), started)
 
     @cached_property
     def cut(self) -> Cut:
-        """The division of each robot's samples into chunks."""
         return Cut(self.samples)
 
     def subjects(self) -> list[RobotInput]:
@@ -62,12 +58,11 @@ class Manifest:
         return [RobotInput(origin.source, origin, stamp) for origin, stamp in self.robots]
 
     def key(self, robot: int, index: int) -> str:
-        """Return the key of a chunk."""
         return hashlib.sha256(f"{self._keys[robot]} {index} of {len(self.cut)}".encode()).hexdigest()
 
     @cached_property
     def _keys(self) -> list[str]:
-        """The key of each robot, which is a sha256 of the robot's text, the settings and the versions."""
+        """The key of each robot: a sha256 of the robot's text, the settings and the versions."""
         settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
@@ -75,24 +70,16 @@ class Manifest:
         ]
 
     def as_json(self) -> bytes:
-        """Return the bytes of the file."""
         return (json.dumps({"schema": LAYOUT} | as_data(self), indent=1) + "\n").encode()
 
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
-        """Read a manifest from the bytes of a file.
-
-        Raises:
-            InputError: The file is not JSON or not a manifest, or has another layout.
-        """
+        """Read a manifest; raise InputError for a file that is no manifest, or has another layout."""
         layout = Layout(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
         return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
-        """Return the differences from another manifest, each with the values in the two manifests.
-
-        The result is empty if the two manifests define the same chunks.
-        """
+        """Return the differences of the definitions of chunks, each with the values of both manifests."""
         own, theirs = (
             {"samples": m.samples, "seed": m.seed, "number of robots": len(m.robots)} | m.provenance
             for m in (self, other)
@@ -110,12 +97,8 @@ class Manifest:
         return [*lines[:_SHOWN], f"{len(lines) - _SHOWN} more"] if len(lines) > _SHOWN + 1 else lines
 
 
-def _versions(subjects: Sequence[RobotInput]) -> dict[str, str]:
-    return versions(subject.origin.oracle for subject in subjects)
-
-
 def _short(value: object) -> str:
-    """Shorten a digest to its first 12 characters."""
+    """Return the first 12 characters of a digest; return other values as text."""
     text = str(value)
     return text[:12] if len(text) == 64 else text
 

@@ -16,10 +16,10 @@ from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
 
 #: Fraction of the free memory that a validation uses.
 SHARE = 0.5
-#: Memory (bytes) that Pinocchio needs, measured with version 4.1.0.
+#: Bytes that Pinocchio 4.1.0 needs (measured).
 #: The workspace needs _FOR_CUBE * nv^3, and each link needs _FOR_LINK.
 _FOR_CUBE, _FOR_LINK = 64, 24_000
-#: A block of samples needs at most this number of arrays at a time, all with the size of the block.
+#: Maximum number of arrays at a time, all with the size of a block of samples.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
@@ -39,16 +39,7 @@ def needed(tree: KinematicTree, samples: int) -> int:
 
 
 def demand(tree: KinematicTree, samples: int, most: int | None) -> None:
-    """Raise OracleError if a robot needs more memory than allowed.
-
-    Args:
-        tree: The robot.
-        samples: Number of samples that are compared together.
-        most: Allowed bytes; None: no limit.
-
-    Raises:
-        OracleError: The robot needs more.
-    """
+    """Raise OracleError if a comparison of `samples` configurations needs more than `most` bytes."""
     wanted = needed(tree, samples)
     if most is not None and wanted > most:
         raise OracleError(
@@ -66,11 +57,7 @@ def _gigabytes(size: int) -> str:
 
 
 def _free() -> Iterator[int]:
-    """Yield several numbers of free bytes.
-
-    The numbers are the free bytes of the machine, the bytes that each control group still allows, and the
-    bytes that the limit of the process (`ulimit`) still allows.
-    """
+    """Yield free bytes: of the machine, within each control group, and within the limit of the process."""
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024
@@ -101,7 +88,7 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
 
 
 def _cached(place: Path) -> int:
-    """Return the number of bytes of cached files that a control group has not read recently.
+    """Return the bytes of cached files that a control group has not read recently.
 
     The kernel counts these bytes as used, but frees them on demand.
     """

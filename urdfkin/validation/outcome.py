@@ -1,7 +1,6 @@
 """Define the verdict on a robot, and the outcome of a validation run with its reason.
 
-Only this module decides whether a run has passed. New reports and reports that are read from a file use this
-module.
+Only this module decides whether a run has passed, for new reports and for reports that are read from a file.
 """
 
 from __future__ import annotations
@@ -21,17 +20,17 @@ class Verdict(StrEnum):
     VERIFIED = "verified"
 
 
-#: Exit codes for three cases: a result disagrees, a robot cannot be read, or Pinocchio did not check a robot.
+#: Exit codes: a result disagrees, a robot cannot be read, or Pinocchio did not check a robot.
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
-#: Exit code of an interrupted run: 128 + SIGINT, as in shells.
+#: Exit code of an interrupted run, as in shells: 128 + SIGINT.
 INTERRUPTED = 130
-#: The possible verdicts of a failed run, with words for one robot and words for several robots.
+#: Verdicts of a failed run, in words for one robot and for several robots.
 _WORDS = {
     Verdict.DISAGREES: ("disagrees", "disagree"),
     Verdict.NOT_VERIFIED: ("is not verified", "are not verified"),
     Verdict.BAD_INPUT: ("has bad input", "have bad input"),
 }
-#: For each exit code: the verdict on a run that ends with this code.
+#: Verdict of a run for each exit code.
 OUTCOMES = {
     0: Verdict.VERIFIED.value,
     DISAGREEMENT: Verdict.DISAGREES.value,
@@ -67,12 +66,7 @@ class Outcome:
 
 
 def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> Outcome:
-    """Return the outcome of a run.
-
-    Args:
-        verdicts: The verdicts of the robots in the report.
-        asked: Number of requested robots.
-        interrupted: Whether the run ended early.
+    """Return the outcome of a run with `asked` requested robots.
 
     >>> outcome(["verified", "disagrees"], asked=3, interrupted=False)
     Outcome(exit_code=1, reason='1 of 3 robots disagrees, 1 of 3 robots without a report')

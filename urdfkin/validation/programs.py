@@ -39,9 +39,9 @@ from urdfkin.model.tree import FloatArray
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: An answer has at most _MOST bytes. An error message quotes at most _TAIL bytes of the program's standard
-#: error.
+#: Maximum number of bytes in an answer.
 _MOST = 64 * 2**20
+#: Maximum number of quoted bytes of the program's standard error.
 _TAIL = 300
 #: Number of failures in a row after which the program is not started again.
 _PATIENCE = 3
@@ -139,7 +139,7 @@ class Program:
             ProgramError: the program ended, took too long, or answered with no result.
         """
         if self._failures >= _PATIENCE:
-            raise ProgramError(f"not asked: the program failed {_PATIENCE} times in a row")
+            raise ProgramError(f"not called: the program failed {_PATIENCE} times in a row")
         if self._process is None:
             self._start()
         values = {letter: x.tolist() for letter, x in zip("qva", inputs, strict=False)}
@@ -153,7 +153,7 @@ class Program:
         return answer
 
     def _start(self) -> None:
-        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  stays open while the process runs
+        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  the file stays open while the process runs
         try:
             self._process = subprocess.Popen(
                 self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, bufsize=0
@@ -207,10 +207,7 @@ class Program:
         return bytes(line)
 
     def _ended(self) -> str:
-        """Return a message about a program that closed its standard output.
-
-        The message has the exit status of the program and the end of its standard error.
-        """
+        """Return a message with the program's exit status and the end of its standard error."""
         assert self._process is not None
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)

@@ -1,11 +1,9 @@
 """Functions that run on the machines of a cluster.
 
-A chunk runs in a separate process, not in the process of Dask's worker.
-
-Dask's worker imports no computing code, so a robot can only crash the separate process and not the worker. A
-chunk that crashes its process is tried a second time in a new process. If the second process crashes too, the
-robot's result is "not verified" with the signal as the reason. Chunks and answers are transferred as bytes.
-The text of a robot is sent only once for all chunks of the robot.
+Dask's worker imports no computing code. A chunk runs in a separate process, so a robot can only crash this
+process and not the worker. A chunk that crashes its process is tried a second time in a new process. If the
+second process crashes too, the robot's result is "not verified" with the signal as the reason. Chunks and
+answers are transferred as bytes. The text of a robot is sent only once for all chunks of the robot.
 """
 
 from __future__ import annotations
@@ -22,8 +20,9 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of a worker for a chunk. "answer": the pickled results. "died": the reason for two crashes.
-#: "other code": the versions on the worker, because they differ from ours.
+#: Return value of a worker for a chunk.
+#: "answer" comes with the pickled results, and "died" with the reason for two crashes.
+#: "other code" comes with the worker's versions, because they differ from the client's.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -40,18 +39,14 @@ def hold(robot: bytes) -> bytes:
 
 
 def computes() -> dict[str, str]:
-    """Return the versions and digests of the code on this machine."""
     return provenance()
 
 
 def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
     """Run a chunk in a process and return its answer.
 
-    Args:
-        robot: The pickle of the chunk's robot.
-        chunk: The pickle of the chunk without the robot.
-        by: Versions and digests on the client. The chunk runs only if the versions and digests on this
-            machine are the same.
+    `robot` and `chunk` are pickles; the chunk is pickled without its robot. The chunk runs only if the
+    client's versions and digests (`by`) are those of this machine.
     """
     if by != computes():
         return "other code", computes()
@@ -65,18 +60,17 @@ def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
 
 
 def end_idle() -> None:
-    """End the idle processes."""
     with _lock:
         while _idle:
             _idle.pop().end()
 
 
 class _DiedError(Exception):
-    """The process that ran a chunk crashed. The message of this exception states the cause."""
+    """The process that ran a chunk crashed; the message states the cause."""
 
 
 class _Parcel:
-    """A robot and a chunk as bytes. Unpickling an object of this class returns the chunk."""
+    """A robot and a chunk as bytes; unpickling a parcel returns the chunk."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk

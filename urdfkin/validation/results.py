@@ -1,6 +1,6 @@
 """Define the report of a validation, and the versions on which the report's numbers depend.
 
-`ValidationReport.as_dict` returns the JSON document, whose layout `urdfkin.validation.document` defines.
+`urdfkin.validation.document` defines the layout of the JSON document.
 """
 
 from __future__ import annotations
@@ -34,10 +34,8 @@ if TYPE_CHECKING:
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages of urdfkin that only display results.
-#: The code of these packages may change between two runs of a campaign.
+#: Packages that only display results; their code may change during a campaign.
 _SHOWING = ("cli", "report", "view")
-#: Libraries that compute results or read robots.
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
 
@@ -64,15 +62,10 @@ class RobotReport:
 
     Attributes:
         origin: Source of the robot and its loading options.
-        name: The robot's name in the URDF.
-        verdict: The verdict.
         reason: Reason why the robot is not verified; None if it is verified.
         joints: Names of the moving joints, mimic joints included.
         frames: Names of the compared frames: every link and every joint.
         tallies: Error statistics of each quantity in each reference frame.
-        samples: Number of compared configurations.
-        seconds: Computing time.
-        portrait: Summary of the robot and the findings in its file.
         clock: Computing times of the parts; None if nothing was computed.
         error: The traceback of an unexpected error, for a bug report; None otherwise.
     """
@@ -110,10 +103,7 @@ class RobotReport:
         return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
     def worst(self, quantity: str) -> float | None:
-        """Return the largest disagreement of a quantity, in eps * scale.
-
-        The result is None if the quantity was not compared.
-        """
+        """Return the largest disagreement of a quantity, in eps * scale; None: it was not compared."""
         return max((tally.worst for tally in self.of(quantity)), default=None)
 
     def replay(self, key: Key) -> str | None:
@@ -123,7 +113,6 @@ class RobotReport:
         return None if case is None else replay(self.origin, quantity, reference, case)
 
     def as_dict(self, judgement: Judgement | None = None) -> dict[str, Any]:
-        """Return the robot's part of the JSON document."""
         return {
             "source": self.source,
             "name": self.name,
@@ -177,9 +166,8 @@ class RobotReport:
 
 
 def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
-    """Return the command that computes a case again."""
     row = QUANTITIES[quantity]
-    # The name of a joint can also be the name of a link, so the prefix "joint:" marks the joint.
+    # The prefix "joint:" is needed because a link may have the same name.
     frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
     origin = replace(origin, oracle=None)  # the command compares the result with Pinocchio
     return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
@@ -190,10 +178,7 @@ class ValidationReport(Displayable):
     """Report of a whole run.
 
     Attributes:
-        robots: One report for each robot, in the requested order.
         asked: Number of requested robots.
-        samples: Number of random configurations for each robot.
-        seed: Seed of the samples.
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
@@ -265,10 +250,7 @@ class ValidationReport(Displayable):
         return self.outcome.exit_code
 
     def as_dict(self) -> Document:
-        """Return the JSON document.
-
-        If a disagreement is infinite or NaN, the document contains null.
-        """
+        """Return the JSON document; an infinite or NaN disagreement becomes null."""
         judgements = iter(self.judgements)  # only compared robots have an accuracy result
         document = {
             "schema": VALIDATION.name,
@@ -292,10 +274,7 @@ class ValidationReport(Displayable):
 
 
 def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
-    """Group the robots that a single command can validate.
-
-    The robots of a group have the same options, and at most one comes from standard input.
-    """
+    """Group the robots by options; a group has at most one robot from standard input."""
     groups: dict[tuple[str, int], list[Origin]] = {}
     texts = Counter[str]()
     for origin in origins:

@@ -1,8 +1,7 @@
 """Represent the robots of a validation as plain data; the digest of a robot's text identifies the robot.
 
-A robot from a file is stored as its path, so that thousands of robots take little memory. The text of the
-robot is read only when it is needed. If the text has changed since the start of the validation, reading it is
-an error.
+A robot from a file is stored as its path, so that thousands of robots take little memory. Reading a text that
+has changed since the start of the validation is an error.
 """
 
 from __future__ import annotations
@@ -28,7 +27,6 @@ from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_usd, is_xacro, read_source
 from urdfkin.verify.oracles import ORACLES, PINOCCHIO
 
-#: Input of a validation: anything that `load` accepts, or a loaded robot.
 Given = Source | DHTable | Robot
 
 
@@ -54,7 +52,6 @@ class RobotInput:
 
     @classmethod
     def of(cls, robot: Robot) -> RobotInput:
-        """Return the input for a loaded robot."""
         if robot.source in catalogue():
             found = _word(robot.source, robot.origin.mimic, robot.origin.root_joint)
             return replace(found, origin=replace(found.origin, lock=robot.origin.lock))
@@ -125,7 +122,7 @@ def subjects(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
-    """Return the robots as plain data, and a dict of reading errors with the robot's index as the key."""
+    """Return the robots as plain data, and reading errors by the robot's index."""
     found, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:
@@ -144,7 +141,6 @@ def subject(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> RobotInput:
-    """Return one robot as plain data; an error in reading the robot is raised."""
     found = _subject(robot, mimic, root_joint, xacro_args)
     if isinstance(lock, str | Mapping) and not lock and joints is None:
         return found
@@ -173,7 +169,6 @@ def _subject(
 
 
 def _called(robot: Given) -> str:
-    """Return the name of a robot that cannot be read."""
     if isinstance(robot, str | os.PathLike):
         return str(robot) if isinstance(robot, str) else as_word(Path(robot))
     return f"<{type(robot).__name__}>"

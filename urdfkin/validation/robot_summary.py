@@ -5,7 +5,7 @@ plain data, which can be sent between processes and written as JSON.
 
 The chains of a catalogue robot are the limbs in the catalogue. For other robots, the chains are the paths
 from the base to the leaves. If several paths have the same moving joints, the summary contains one of them.
-The tables are exact. Each chain has a standard and a modified table, which are compared with Pinocchio.
+Each chain has a standard and a modified table. The tables are exact, and are compared with Pinocchio.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from urdfkin.dh import DHRow, DHTable
+from urdfkin.dh import DHTable
 from urdfkin.dh.make import dh_table
 from urdfkin.errors import InputError
 from urdfkin.model.configuration import NarrowedRange, draw, narrowed_ranges
@@ -81,10 +81,7 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
 
 
 def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
-    """Return the part of a joint's range in which its mimic joints stay within their limits.
-
-    The result is None if the mimic joints do not narrow the range.
-    """
+    """Return the part of a joint's range in which its mimic joints are within limits; None: not narrowed."""
     if narrowed is None:
         return None
     lower, upper = narrowed.kept or (None, None)
@@ -100,10 +97,8 @@ _CONVENTIONS = ("standard", "modified")
 def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
     """Return each chain as plain data for JSON: frames, two tables, and their differences from Pinocchio.
 
-    Args:
-        robot: The robot.
-        oracle: Pinocchio's model; None if Pinocchio cannot check the robot, so that the tables are not
-            checked.
+    `oracle` is Pinocchio's model. If it is None, Pinocchio cannot check the robot, and the tables are not
+    checked.
     """
     found = []
     for limb, base, tip in _chains(robot):
@@ -131,7 +126,11 @@ def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
 
 def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
     data: dict[str, Any] = {
-        name: {"rows": [_row(row) for row in table.rows], "base": table.base, "tool": table.tool}
+        name: {
+            "rows": [{entry: getattr(row, entry) for entry in Row.__annotations__} for row in table.rows],
+            "base": table.base,
+            "tool": table.tool,
+        }
         for name, table in tables.items()
     }
     if oracle is None:
@@ -146,19 +145,12 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
     }
 
 
-def _row(row: DHRow) -> dict[str, Any]:
-    return {name: getattr(row, name) for name in Row.__annotations__}
-
-
 @dataclass(frozen=True, slots=True)
 class RobotSummary:
     """Summary of a robot in a report.
 
     Attributes:
         model: The result of `describe`; None if the robot could not be read.
-        findings: The findings in the file, as `Finding.as_dict` returns them.
-        chains: Denavit-Hartenberg tables of the robot's chains, in the standard and in the modified
-            convention.
         second_reader: The comparison with yourdfpy's tree of the same text; None: not compared.
     """
 
@@ -169,9 +161,9 @@ class RobotSummary:
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
-        """Return the summary of a loaded robot; the tables are checked if Pinocchio accepts the robot."""
+        """Return the summary of a loaded robot; without an oracle, its tables are not checked."""
         mimic, added = robot.verifier.mimic, robot.root_joint is not None
-        reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added).as_dict())
+        reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
         return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
 
     @property
@@ -197,19 +189,14 @@ def chain_disagreement(chain: Chain) -> str | None:
 
 
 def reader_disagreement(reading: SecondReading) -> str | None:
-    """Describe how yourdfpy's tree differs from urdfkin's.
-
-    The result is None if the trees are equal or were not compared.
-    """
+    """Describe how yourdfpy's tree differs from urdfkin's; None if they are equal or were not compared."""
     if not reading["differences"]:
         return None
     return f"{reading['by']} reads another robot from the file: {'; '.join(reading['differences'])}"
 
 
-#: Summary of a robot that could not be read.
 NO_PORTRAIT = RobotSummary()
 
 
 def entries_of(findings: Iterable[Finding]) -> tuple[FindingEntry, ...]:
-    """Return findings as plain data for JSON."""
     return tuple(cast("FindingEntry", finding.as_dict()) for finding in findings)

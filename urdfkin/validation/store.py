@@ -5,10 +5,8 @@
     DIR/judge.json                settings of the accuracy study; chunks/*/*.judged: its results
     DIR/lock                      locked by the process that writes to the store
 
-Files are written atomically, so a file is either complete or absent. The answer of a chunk is stored under
-the chunk's key and does not depend on the engine. A damaged file is reported and moved to `damaged/`, and the
-chunk of this file is computed again. A file whose name belongs to no chunk of the campaign is also reported
-and moved.
+Files are written atomically, so a file is either complete or absent. A damaged file, and a file whose name
+belongs to no chunk, is reported and moved to `damaged/`. The chunk of a damaged file is computed again.
 """
 
 from __future__ import annotations
@@ -36,8 +34,8 @@ _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
 JUDGE = "judge.json"
-#: Suffix of a file with the accuracy result of a robot. `urdfkin.validation.accuracy_store` computes the key
-#: that is the name of the file.
+#: Suffix of a file with the accuracy result of a robot.
+#: `urdfkin.validation.accuracy_store` computes the name of the file.
 JUDGED = ".judged"
 _DONE, _FAILED = ".chunk", ".failed"
 
@@ -46,7 +44,6 @@ _TRIES = 10
 
 _T = TypeVar("_T")
 
-#: Callback for messages about damaged files.
 Tell = Callable[[str], None]
 
 
@@ -55,8 +52,6 @@ class Store:
     """The folder of a stored validation, for reading. The function `opened` returns a store for writing.
 
     Attributes:
-        folder: The folder.
-        manifest: Definition of the campaign.
         tell: Callback for each damaged file.
         scratch: Folder for unfinished files; None: the store is read-only.
     """
@@ -79,7 +74,7 @@ class Store:
     def answer(self, robot: int, index: int) -> Answer | None:
         """Return the answer of a chunk, or None if the store has no answer.
 
-        A damaged file is moved to `damaged/`; in a read-only store, a damaged file is not moved.
+        A damaged file is moved to `damaged/`, unless the store is read-only.
         """
         key = self.manifest.key(robot, index)
         return self.kept(key, _DONE, read) or self.kept(key, _FAILED, read)
@@ -105,12 +100,10 @@ class Store:
         self.keep_part(key, _FAILED if isinstance(found, Failure) else _DONE, written(key, found))
 
     def has(self, key: str, kind: str) -> bool:
-        """Return whether a file with the given key exists."""
         return self._place(key, kind).exists()
 
     @property
     def has_judge(self) -> bool:
-        """Whether an accuracy study was requested."""
         return (self.folder / JUDGE).exists()
 
     def keep_part(self, key: str, kind: str, data: bytes) -> None:
@@ -135,10 +128,7 @@ class Store:
                 self._quarantine(place, "is not used: no chunk of this campaign has this name")
 
     def counts(self) -> dict[int, tuple[int, bool]]:
-        """Return, for each robot, the number of stored chunks and whether the robot failed.
-
-        Only file names are read.
-        """
+        """Return each robot's number of stored chunks and whether it failed; only file names are read."""
         names = {place.name for kind in (_DONE, _FAILED) for place in self._files(kind)}
         found = {}
         for robot in range(len(self.manifest.robots)):
@@ -148,10 +138,7 @@ class Store:
         return found
 
     def take(self, other: Store) -> int:
-        """Copy the chunks that are missing in this store from another store of the same campaign.
-
-        Return the number of copied chunks.
-        """
+        """Copy missing chunks from another store of the same campaign, and return their number."""
         other.check_names()
         taken = 0
         for robot in range(len(self.manifest.robots)):
@@ -161,17 +148,14 @@ class Store:
                     taken += 1
         return taken
 
-    def demand_same(self, manifest: Manifest, where: object) -> None:
-        """Raise InputError with the differences if a manifest describes another campaign.
-
-        Raises:
-            InputError: The manifest differs from this store's.
-        """
+    def demand_same(self, manifest: Manifest, where: object = None) -> None:
+        """Raise InputError with the differences if a manifest describes another campaign."""
         if differences := self.manifest.differences(manifest):
+            there = "here" if where is None else f"in {where}"
             raise InputError(
                 "the store belongs to another campaign",
                 where=str(self.folder),
-                found=f"(in the store, and in {where}) {'; '.join(differences)}",
+                found=f"(in the store, and {there}) {'; '.join(differences)}",
                 remedy="use the options of the stored campaign, or another folder",
             )
 
@@ -184,15 +168,10 @@ class Store:
             return None
 
     def write_manifest(self) -> None:
-        """Write the manifest."""
         self.write(_MANIFEST, self.manifest.as_json())
 
     def write(self, name: str, data: bytes) -> None:
-        """Write a file beside the manifest.
-
-        Raises:
-            SourceError: The file cannot be written.
-        """
+        """Write a file beside the manifest; raise SourceError if the file cannot be written."""
         self._write(self.folder / name, data)
 
     def _place(self, key: str, kind: str) -> Path:
@@ -233,18 +212,11 @@ class Store:
 def opened(
     folder: Path, manifest: Manifest, tell: Tell, *, shard: str | None = None, retry_failed: bool = False
 ) -> Iterator[Store]:
-    """Open the store of a validation so that no other process can write into it.
+    """Open the store of a validation, or create it, so that no other process can write into it.
 
-    Create the store if it does not exist.
-
-    Args:
-        folder: The folder.
-        manifest: Definition of the campaign.
-        tell: Callback for each damaged file.
-        shard: The part of the store to lock, for example "2/4". Other processes may write other parts. None:
-            lock the whole store.
-        retry_failed: Whether to delete the stored failures. The files of the failed robots may have changed
-            in the meantime.
+    Only the part `shard` of the store is locked, for example "2/4": other processes may write other parts.
+    Without `shard`, the whole store is locked. With `retry_failed`, stored failures are deleted, because the
+    files of the failed robots may have changed.
 
     Raises:
         SourceError: The store cannot be made or written.
@@ -267,7 +239,7 @@ def opened(
                     remedy="delete the link",
                 )
             scratch = folder / _WRITING / (shard or "all").replace("/", "-of-")
-            shutil.rmtree(scratch, ignore_errors=True)  # unfinished files of a killed process
+            shutil.rmtree(scratch, ignore_errors=True)  # a killed process leaves unfinished files
             scratch.mkdir(parents=True)
             try:
                 store = _check_or_write_manifest(
@@ -286,10 +258,7 @@ def opened(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether this file may belong to another shard that starts at the same time.
-
-    The other shard may create the file before it writes the manifest.
-    """
+    """Return whether another shard that starts at the same time may create the file before its manifest."""
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 
@@ -306,7 +275,7 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
         before.forget_failures()
         store.write_manifest()
         return store
-    before.demand_same(store.manifest, "here")
+    before.demand_same(store.manifest)
     if retry_failed:
         before.forget_failures()
     return before
@@ -330,7 +299,6 @@ def _only_failed_ones_differ(store: Store, manifest: Manifest) -> bool:
 
 @contextlib.contextmanager
 def _locked(folder: Path, shard: str | None) -> Iterator[None]:
-    """Lock the whole store, or one part of the store."""
     with contextlib.ExitStack() as stack:
         whole = stack.enter_context(_lock_file(folder / _LOCK))
         _lock(whole, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
@@ -368,7 +336,7 @@ def _lock(file: IO[bytes], how: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, how):
             return
-        time.sleep(0.1)  # another process may hold the lock for a moment to test whether it is free
+        time.sleep(0.1)  # another process may test for a moment whether the lock is free
     raise InputError(
         "another process uses this store",
         where=str(folder),

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import astuple, dataclass
 from typing import Any, ParamSpec, TypeVar
 
@@ -14,16 +13,9 @@ _T = TypeVar("_T")
 
 @dataclass(slots=True)
 class Clock:
-    """Computing time (seconds) of each part of a validation.
+    """Computing time (seconds) of each part; `read` includes the models of urdfkin and Pinocchio.
 
-    `compare` is the total time minus the times of the other parts.
-
-    Attributes:
-        read: Reading the file and building the models of urdfkin and Pinocchio.
-        urdfkin: Computation with urdfkin.
-        pinocchio: Computation with Pinocchio.
-        second: Computation with a second oracle.
-        compare: Bounds and comparison.
+    The time `compare` of the bounds and the comparison is the total time minus the times of the other parts.
     """
 
     read: float = 0.0
@@ -32,35 +24,19 @@ class Clock:
     compare: float = 0.0
     second: float = 0.0
 
-    def ours(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of urdfkin, and add its computing time to `urdfkin`."""
-        with self._add_time("urdfkin"):
-            return function(*args, **kwargs)
-
-    def theirs(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of Pinocchio, and add its computing time to `pinocchio`."""
-        with self._add_time("pinocchio"):
-            return function(*args, **kwargs)
-
-    def second_oracle(self, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function of the second oracle, and add its computing time to the entry "second"."""
-        with self._add_time("second"):
-            return function(*args, **kwargs)
-
-    @contextmanager
-    def _add_time(self, part: str) -> Iterator[None]:
+    def timed(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        """Call a function, and add its computing time to a part, such as "urdfkin"."""
         begin = time.perf_counter()
         try:
-            yield
+            return function(*args, **kwargs)
         finally:
             setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
-        """Set the entry `compare` to the total time (s) minus the times of all other parts."""
+        """Set `compare` to the total time (s) minus the times of all other parts."""
         self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
         return {
             "read": round(self.read, 4),
             "urdfkin": round(self.urdfkin, 4),
@@ -70,5 +46,4 @@ class Clock:
 
 
 def total(clocks: Iterable[Clock]) -> Clock:
-    """Return the sum of several clocks."""
     return Clock(*(sum(seconds) for seconds in zip(*map(astuple, clocks), strict=True)))

@@ -1,9 +1,8 @@
 """Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
 
 The file `robots/features.toml` defines small robots with one feature of URDF each. For robots of the
-catalogue, the vectors contain the robot's name, not its URDF. The reader of `urdfkin.verify.exact` computes
-all values from the decimals of the URDF. The files depend only on these texts. Configurations are computed
-from digests of names instead of random numbers.
+catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimals of
+the URDF, and configurations from digests of names. Therefore, the files depend only on these texts.
 """
 
 from __future__ import annotations
@@ -55,21 +54,20 @@ from urdfkin.verify.quantities import (
     Quantity,
 )
 
-#: Version of the file format of the test vectors. Programs that read version 1 can read all versions 1.x, but
-#: not version 2.
+#: Version of the file format of the test vectors.
+#: Programs that read version 1 can read all versions 1.x, but not version 2.
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
-#: Number of configurations of each robot. The first is the zero configuration; a joint whose limits exclude
-#: zero has its limit nearest to zero.
+#: Number of configurations of each robot; the first is the zero configuration.
+#: A joint whose limits exclude zero has its limit nearest to zero.
 SAMPLES = 3
-#: Joint velocities, accelerations, and positions of planar and floating joints lie between -_RANGE and
-#: _RANGE.
+#: Bound of velocities, accelerations, and positions of planar and floating joints.
 _RANGE = 2.0
-#: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit. A multiple of
-#: 1 / 1024 has few decimals, and a double represents it exactly.
+#: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
+#: A multiple of 1 / 1024 has few decimals, and a double represents it exactly.
 _GRID = 1024.0
-#: A tolerance is first rounded to `_SAME` digits. Then it is rounded up to `_DIGITS` digits, and written to
-#: the file.
+#: A tolerance is first rounded to `_SAME` digits.
+#: Then the tolerance is rounded up to `_DIGITS` digits.
 _DIGITS, _SAME = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -77,8 +75,8 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The quantities of the test vectors. The classical and the spatial acceleration differ by w x vel. The scale
-#: of both accelerations includes this product.
+#: The quantities of the test vectors.
+#: The classical and the spatial acceleration differ by w x vel, which the scale of both includes.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -170,10 +168,8 @@ class Feature:
     """A small robot with one feature of URDF.
 
     Attributes:
-        name: Name of the feature.
         rule: The standard's rule.
         note: A known difference between libraries in this feature; None if no difference is known.
-        text: The URDF.
         data: The bytes of the URDF file: the encoded text with its XML declaration.
         frames: Links of the test vectors.
     """
@@ -276,7 +272,7 @@ def _tolerance(k: float, scale: float) -> str:
     """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
         return "0"
-    with localcontext(prec=_SAME):  # drop the last digits, which may differ between processors
+    with localcontext(prec=_SAME):  # processors may differ in the last digits
         number = +Decimal(k * max(EPS * scale, LEAST_UNIT))
     with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
         return str((+number).normalize())
@@ -287,13 +283,7 @@ def _tolerance(k: float, scale: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The files of one robot.
-
-    Attributes:
-        robot: Name of the feature or robot.
-        files: Paths of the files: the vectors as JSON and as lines, and the URDF if it is written.
-        numbers: Number of values.
-    """
+    """The files of one robot with the number of values: vectors as JSON and as lines, and a written URDF."""
 
     robot: str
     files: tuple[Path, ...]
@@ -302,8 +292,6 @@ class Written:
 
 @dataclass(frozen=True, slots=True)
 class _Head:
-    """The entries of a document that do not depend on configurations."""
-
     robot: str
     file: str
     sha256: str
@@ -313,11 +301,7 @@ class _Head:
 
 
 def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
-    """Write the test vectors and the URDF of each small robot in `features.toml`. Yield the written files.
-
-    Raises:
-        SourceError: a file cannot be written.
-    """
+    """Write the test vectors and the URDF of each small robot in `features.toml`. Yield the written files."""
     for feature in features().values():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
@@ -332,16 +316,7 @@ def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
 
 
 def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> Written:
-    """Write the test vectors of a robot, with its URDF if the robot is not in the catalogue.
-
-    Args:
-        folder: An existing folder.
-        robot: The robot. The frame is its default tip.
-        samples: Number of configurations.
-
-    Raises:
-        SourceError: a file cannot be written.
-    """
+    """Write the test vectors of a robot's default tip, with its URDF if the robot is not in the catalogue."""
     frames, name = (robot.tip_frame,), name_of(robot)
     if (entry := catalogue().get(robot.source)) is not None:
         sha256 = hashlib.sha256(read_bytes(entry.path)).hexdigest()

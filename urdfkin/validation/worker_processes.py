@@ -1,13 +1,9 @@
 """Engine that runs chunks in processes of this machine; the crash of a process affects only its robot.
 
-A worker process runs one chunk after another, and ends when its parent process ends. A worker is a new Python
-interpreter that does not import the parent's main module, so a script needs no `__main__` guard. The worker
-imports nothing from the current folder.
-
-One thread distributes the chunks and receives the answers. As long as robots are waiting, each worker has its
-own robot. A worker has one chunk at a time, so a crash can be attributed to a robot. This robot is tried once
-more, alone in a process, after all other robots. With `isolate`, each robot runs alone from the start, so the
-first crash of a robot is reported as its result.
+A worker is a new Python interpreter that imports neither the parent's main module nor modules of the current
+folder, so a script needs no `__main__` guard. A worker has one chunk at a time, so a crash can be attributed
+to a robot. This robot is tried once more, alone in a process, after all other robots. With `isolate`, each
+robot runs alone from the start, so the first crash of a robot is reported as its result.
 """
 
 from __future__ import annotations
@@ -29,7 +25,7 @@ from urdfkin.validation.answer import Answer, Failure, answer
 from urdfkin.validation.chunk import Chunk
 from urdfkin.validation.engines import DIED, DIED_TWICE, Enter, Row, Task, Work, WorkQueue, died, lost
 
-#: The module with the function `serve` that a process runs.
+#: Module with the function `serve`, which a process runs.
 WORKER = "urdfkin.validation.worker_processes"
 #: Maximum time (seconds) between the end of a worker's pipe and the end of its process.
 _GRACE = 5.0
@@ -46,15 +42,13 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            theirs.close()  # only the worker has this end of the pipe, so it closes when the worker ends
+            theirs.close()  # the pipe closes when the worker ends, because only the worker has this end
 
     @property
     def alive(self) -> bool:
-        """Whether the process is running."""
         return self._process.poll() is None
 
     def end(self) -> None:
-        """End the process at once."""
         self.connection.close()
         self._process.kill()
         self._process.wait()
@@ -70,11 +64,9 @@ class WorkerProcess:
 def _interpreter(pipe: int) -> subprocess.Popen[bytes]:
     """Start a Python interpreter that imports the same packages as this process.
 
-    The new interpreter does not import modules from the current folder. It does not import this process's
-    main module.
-
-    The new interpreter has its own process group. Ctrl-C in the terminal therefore interrupts only the parent
-    process, which then saves the finished results.
+    The new interpreter imports neither modules from the current folder nor this process's main module. It has
+    its own process group. Ctrl-C in the terminal therefore interrupts only the parent process, which then
+    saves the finished results.
     """
     command = own_python(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)
@@ -99,12 +91,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 def serve(pipe: int, parent: int) -> None:
-    """Answer chunks until the pipe ends.
-
-    Args:
-        pipe: Descriptor of the connection to the parent.
-        parent: Process id of the parent.
-    """
+    """Answer chunks from a connection (its descriptor is `pipe`) to a parent process, until the pipe ends."""
     _end_with(parent)
     connection, chunks = Connection(pipe), SimpleQueue[Chunk]()
     threading.Thread(target=_receive, args=(connection, chunks), daemon=True).start()
@@ -133,12 +120,7 @@ def _end_with(parent: int) -> None:
 
 
 class ProcessEngine:
-    """Engine of local processes.
-
-    Args:
-        jobs: Maximum number of processes at a time.
-        isolate: Whether each robot has its own process.
-    """
+    """Engine of at most `jobs` local processes at a time; if `isolate`, each robot has its own process."""
 
     def __init__(self, jobs: int, *, isolate: bool = False) -> None:
         self._jobs, self._isolate = jobs, isolate
@@ -155,21 +137,17 @@ class ProcessEngine:
 
 
 class _Crew:
-    """A group of worker processes.
+    """A group of at most `jobs` worker processes.
 
-    Args:
-        work: The tasks of each robot.
-        jobs: Maximum number of workers.
-        enter: Callback that receives the answers.
-        alone: None: several workers may share a robot. A text: each worker validates only one robot, and the
-            text is the reason in the report if the worker crashes.
+    If `alone` is None, several workers may share a robot. Otherwise, each worker validates only one robot,
+    and `alone` is the reason in the report if the worker crashes.
     """
 
     def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
         self._jobs, self._enter, self._alone = jobs, enter, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_Worker] = []
-        #: The unanswered tasks of each robot that crashed a worker.
+        #: Unanswered tasks of each robot that crashed a worker.
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
@@ -197,7 +175,7 @@ class _Crew:
             try:
                 worker = worker or self._start()
             except Exception as error:
-                if self._workers:  # a new process cannot be started, so continue with the running ones
+                if self._workers:  # a new process cannot be started, so the running ones continue
                     self._queue.put_back(task, row)
                     return
                 self._enter_answer(task, lost("no process could be started", error))

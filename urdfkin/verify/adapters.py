@@ -34,12 +34,12 @@ from typing import Any
 
 import numpy as np
 
-#: Value of a joint, or the values of a planar or floating joint.
+#: Value of a joint; several numbers for a planar or floating joint.
 Value = Any
 Poses = dict[str, Any]
-#: Number of values of a planar joint, and number of values of a floating joint.
+#: Numbers of values of a planar joint and of a floating joint.
 _PLANAR, _FLOATING = 3, 7
-#: Suffixes of the three joints that MuJoCo makes of a planar joint.
+#: Suffixes of the three joints that replace a planar joint in MuJoCo.
 _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
 
 
@@ -57,7 +57,6 @@ class Reading:
     poses: Callable[[Mapping[str, Value]], Poses]
 
     def unset(self, values: Mapping[str, Value]) -> list[str]:
-        """Return the joints in `values` that the library does not move."""
         return [name for name in values if name not in self.joints]
 
 
@@ -83,7 +82,6 @@ def _children(text: str) -> dict[str, str]:
 
 @contextlib.contextmanager
 def _file(text: str) -> Any:
-    """Write a text to a temporary file, for libraries that read files only."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "robot.urdf")
         path.write_text(text, "utf-8")
@@ -103,7 +101,7 @@ def _rigid(R: Any, p: Any) -> Any:
 
 
 def _relative(poses: Poses, root: str) -> Poses:
-    """Return link poses relative to the root link. A missing root link has the identity pose."""
+    """Return link poses relative to the root link; a missing root link has the identity pose."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
@@ -125,7 +123,7 @@ def read_pinocchio(text: str) -> Reading:
                 continue
             joint = model.joints[model.getJointId(name)]
             at = joint.idx_q
-            if joint.nq == 2:  # a continuous joint
+            if joint.nq == 2:  # a continuous joint has two coordinates
                 q[at : at + 2] = math.cos(value), math.sin(value)
             elif joint.nq == 4 and len(value) == _PLANAR:
                 q[at : at + 4] = value[0], value[1], math.cos(value[2]), math.sin(value[2])
@@ -136,7 +134,8 @@ def read_pinocchio(text: str) -> Reading:
             {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
         )
 
-    moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]  # 0 is the world
+    # The joint 0 is the world.
+    moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]
     return Reading(moving, poses)
 
 
@@ -182,10 +181,7 @@ def read_mujoco(text: str) -> Reading:
 
 
 def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
-    """Yield the name and the value of each MuJoCo joint that replaces a joint of the URDF.
-
-    A planar joint becomes two slide joints and a hinge joint.
-    """
+    """Yield the MuJoCo joints for a joint of the URDF, with their values; three joints for a planar joint."""
     if name in names:
         yield name, value
     elif name + _MUJOCO_PLANAR[0] in names:
@@ -203,7 +199,8 @@ def read_drake(text: str) -> Reading:
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root))
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    carried = {child: joint for joint, child in _children(text).items()}  # Drake's name of a floating joint
+    # Drake gives a floating joint the name of its child link.
+    carried = {child: joint for joint, child in _children(text).items()}
     moving = [j for i in plant.GetJointIndices() if (j := plant.get_joint(i)).num_positions()]
     joints = {carried.get(j.name(), j.name()): j for j in moving}
     bodies = [plant.get_body(i) for i in plant.GetBodyIndices(plant.GetModelInstanceByName(_name(text)))]
@@ -226,7 +223,6 @@ def _name(text: str) -> str:
 
 
 def read_idyntree(text: str) -> Reading:
-    """Read with iDynTree."""
     import idyntree.bindings as idt  # noqa: PLC0415
 
     root, loader, computed = _root(text), idt.ModelLoader(), idt.KinDynComputations()
@@ -240,9 +236,8 @@ def read_idyntree(text: str) -> Reading:
     }
     computed.setFloatingBase(root)
 
-    def poses(
-        values: Mapping[str, Value], _owner: Any = loader
-    ) -> Poses:  # `_owner` keeps the loader alive, and the model with it
+    # `_owner` keeps the loader and its model alive.
+    def poses(values: Mapping[str, Value], _owner: Any = loader) -> Poses:
         q = np.zeros(model.getNrOfPosCoords())
         for name in places.keys() & values.keys():
             q[places[name]] = _scalar(values[name])
@@ -256,7 +251,6 @@ def read_idyntree(text: str) -> Reading:
 
 
 def read_yourdfpy(text: str) -> Reading:
-    """Read a URDF with yourdfpy, without the meshes."""
     import yourdfpy  # noqa: PLC0415
 
     logging.getLogger("yourdfpy.urdf").disabled = True
@@ -271,7 +265,6 @@ def read_yourdfpy(text: str) -> Reading:
 
 
 def read_urchin(text: str) -> Reading:
-    """Read a URDF with urchin, without the meshes."""
     import urchin  # noqa: PLC0415
 
     with _file(text) as path:
@@ -286,10 +279,7 @@ def read_urchin(text: str) -> Reading:
 
 
 def _urchins(joint: Any, value: Value) -> Value:
-    """Convert a joint value to urchin's layout.
-
-    A value of a floating joint in urchin is x, y, z, roll, pitch, yaw, or a matrix.
-    """
+    """Convert a joint value to urchin's layout; urchin accepts a matrix for a floating joint."""
     if joint.joint_type != "floating":
         return value
     return _rigid(_rotation(value[3:]), value[:3])
@@ -306,7 +296,6 @@ def _rotation(quaternion: Value) -> Value:
 
 
 def read_kinpy(text: str) -> Reading:
-    """Read with kinpy."""
     import kinpy  # noqa: PLC0415
 
     chain = kinpy.build_chain_from_urdf(text.encode())
@@ -339,7 +328,6 @@ def read_ikpy(text: str) -> Reading:
 
 
 def read_roboticstoolbox(text: str) -> Reading:
-    """Read a URDF with the Robotics Toolbox for Python."""
     import roboticstoolbox as rtb  # noqa: PLC0415
 
     joints = {child: joint for joint, child in _children(text).items()}
@@ -357,7 +345,6 @@ def read_roboticstoolbox(text: str) -> Reading:
 
 
 def read_skrobot(text: str) -> Reading:
-    """Read with scikit-robot."""
     from skrobot.models.urdf import RobotModelFromURDF  # noqa: PLC0415
 
     with _file(text) as path:
@@ -381,8 +368,8 @@ def read_newton(path: str) -> Reading:
     model = builder.finalize(device="cpu")
     state, starts = model.state(), model.joint_q_start.numpy()
     counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
-    # Newton adds a free joint to a body without a joint, so such a joint is not in the file. `eval_mimic`
-    # computes the coordinates of mimic joints.
+    # Newton adds a free joint, which the file does not contain, to a body without a joint.
+    # `eval_mimic` computes the coordinates of mimic joints.
     places = {
         str(label).rpartition("/")[2]: (int(start), int(count))
         for label, kind, leader, start, count in zip(
@@ -430,7 +417,6 @@ class Library:
     single: bool = False
 
 
-#: The libraries, by their names on the command line.
 LIBRARIES: dict[str, Library] = {
     "pinocchio": Library("Pinocchio", "pin", "pinocchio", read_pinocchio, ("urdf", "mjcf")),
     "mujoco": Library("MuJoCo", "mujoco", "mujoco", read_mujoco, ("urdf", "mjcf")),

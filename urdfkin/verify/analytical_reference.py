@@ -27,17 +27,11 @@ Numbers = NDArray[Any]
 
 
 def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Numbers]:
-    """Return the analytical Jacobian for three Euler angles, and the distance from the singularity.
+    """Return the Jacobian (..., 6, n) of the position and three Euler angles, and |sin b| or |cos b| (...).
 
-    The Jacobian contains the derivatives of the position and of the angles.
-
-    Args:
-        name: SciPy's name of the sequence. Capital letters are body axes, small letters are fixed axes.
-        R: (..., 3, 3) rotation from body axes to world axes.
-        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in world axes.
-
-    Returns:
-        The Jacobian (..., 6, n), and the distance (...): |sin b| or |cos b| of the middle angle b.
+    Here b is the middle angle. The sequence has SciPy's name: capital letters are body axes, small letters
+    are fixed axes. `R` (..., 3, 3) rotates body axes to world axes. `J_v` (..., 6, n) is the velocity
+    Jacobian, [linear; angular], in world axes.
     """
     letters = name.lower()[::-1] if name.islower() else name.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)
@@ -47,26 +41,17 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     sense = 1.0 if k == i else float(np.linalg.det(np.eye(3)[[j, i, k]]))
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = sense * across / apart
-        volume = -sense * apart  # first . (middle x third)
+        volume = -sense * apart  # the volume is first . (middle x third)
         reciprocal = [np.cross(middle, third) / volume, middle, np.cross(first, middle) / volume]
     rows = np.stack(reciprocal[::-1] if name.islower() else reciprocal, axis=-2)
     return np.concatenate((J_v[..., :3, :], rows @ J_v[..., 3:, :]), axis=-2), apart[..., 0]
 
 
 def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
-    """Return the analytical Jacobian for a unit quaternion.
-
-    The Jacobian contains the derivatives of the position and of the quaternion.
+    """Return the Jacobian (..., 7, n) of the position and a unit quaternion (..., 4), scalar last.
 
     The derivative of the quaternion is half of the quaternion product of (w, 0) and `quat`, where w is the
-    angular velocity.
-
-    Args:
-        quat: (..., 4) unit quaternion, scalar last.
-        J_v: (..., 6, n) as in `euler_jacobian`.
-
-    Returns:
-        (..., 7, n).
+    angular velocity. `J_v` is the velocity Jacobian as in `euler_jacobian`.
     """
     w = J_v[..., 3:, :].swapaxes(-1, -2)
     q, q0 = quat[..., np.newaxis, :3], quat[..., np.newaxis, 3:]

@@ -62,10 +62,10 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.comparison import KERNELS
 
 _UNTURNED = np.eye(3).ravel()
-#: Indices of the position, the velocities and the accelerations in the state of a moving base.
+#: Indices of position, velocities and accelerations in a moving base's state.
 _OF_BASE = 9, 12, 15, 18, 21
-#: Number of configurations in a block. The compiled function `lengths` computes one block at a time. The
-#: intermediate results for these configurations fit into the processor's first-level cache.
+#: Number of configurations that the compiled function `lengths` computes at a time.
+#: The intermediate results for one block fit into the processor's first-level cache.
 _BLOCK = 64
 
 
@@ -133,13 +133,13 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
     for end in lengths.ends:
         carried = (steps.carried if rates else _carried_place)(states[end.step + 1], end.length)
         for row, values in zip(out, carried, strict=False):
-            row[:, end.place] = values  # `values` is a scalar if it is equal for all configurations
+            row[:, end.place] = values  # a value for all configurations is a scalar
 
 
 def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Compute `out` with a compiled function. The results are equal to the results of `_by_steps`."""
+    """Compute `out` with a compiled function, with the same bits as `_by_steps`."""
     links = lengths.links
-    # If an input is the same for all configurations, the kernel receives only one row of it.
+    # An input that is the same for all configurations becomes a single row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -158,7 +158,7 @@ def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out
 
 
 def _rows(columns: Sequence[FloatArray]) -> FloatArray:
-    """Return an array with the given columns. A column of length 1 is repeated in every row."""
+    """Return an array with the given columns; a column of length 1 is repeated in every row."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
         row[:] = column
@@ -201,7 +201,7 @@ class _Lengths(NamedTuple):
 
 
 def _lengths(plan: CompiledTree) -> _Lengths:
-    """Return the moving joints and the frames of a compiled tree. The result is stored for later calls."""
+    """Return the moving joints and the frames of a compiled tree, which stores the result for later calls."""
     found: _Lengths | None = plan.made.get("lengths")
     if found is None:
         lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
@@ -275,7 +275,7 @@ def _step(link: _Link, state: State, q: Any, v: Any, a: Any) -> State:
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale above the range of doubles is inf. If the scale is inf, `disagreement` accepts no result.
+#: A scale above the range of doubles is inf; `disagreement` then accepts no result.
 _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -525,11 +525,11 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     return _six_rows(linear, angular)
 
 
-#: Pinocchio computes the derivative of the linear part of Jacobian column i with respect to joint j as a sum
-#: of products. This table contains the number of products. The first pair is for a joint j that is joint i or
-#: is nearer to the root than joint i. The second pair is for all other joints j. The first number of a pair
-#: counts the products z x (z x d) of two revolute joints. The second number counts the products z x z of a
-#: revolute and a prismatic joint.
+#: Numbers of products in Pinocchio's derivative of Jacobian column i by joint j, linear rows.
+#: The first pair is for a joint j that is joint i or is nearer to the root than joint i.
+#: The second pair is for all other joints j.
+#: The first number of a pair counts the products z x (z x d) of two revolute joints.
+#: The second number counts the products z x z of a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -609,7 +609,7 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
         apart: (n, frames) s of Pinocchio's rotation.
     """
     s = apart - EPS * size.roundings
-    s = np.where(s > 0.0, s, 0.0)  # if s is below its rounding error, accept no result
+    s = np.where(s > 0.0, s, 0.0)  # no result is accepted if s is below its rounding error
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
         scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
@@ -678,7 +678,7 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
     turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]
     extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
     for f, (end, place) in enumerate(plan.frames):
-        path, step = list[int](), int(end)  # the joints from the frame to the root
+        path, step = list[int](), int(end)  # the path leads from the frame to the root
         while step >= 0:
             path.append(step)
             step = int(plan.parents[step])

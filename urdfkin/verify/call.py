@@ -22,7 +22,7 @@ from urdfkin.verify.oracle import OracleQuery, QueryBatch
 
 T = TypeVar("T")
 
-#: Array types that do not override NumPy's methods.
+#: Array types without methods that override NumPy's.
 _PLAIN = np.ndarray, np.memmap
 
 
@@ -59,7 +59,7 @@ class Call:
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
         given: The inputs of the quantity: q, or q and v, or q, v and a.
-        also: Additional frames; they are computed after the frames in `frame` and are not returned.
+        also: Frames that are computed after the frames in `frame` and are not returned.
         options: Other arguments of the method, by name.
 
     Raises:
@@ -129,10 +129,8 @@ class Call:
         """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
         Subclasses of NumPy's array are rejected. For example, `reshape` of a NumPy matrix returns a different
-        shape than requested. A kernel would then write past the end of the array.
-
-        Raises:
-            InputError: `out` has a wrong type, dtype, layout or shape, or shares memory with an input.
+        shape than requested. A kernel would then write past the end of the array. InputError is raised if
+        `out` has a wrong type, dtype, layout or shape, or shares memory with an input.
         """
         if out is None:
             return None
@@ -146,20 +144,17 @@ class Call:
                 if isinstance(out, np.ndarray) and type(out) not in _PLAIN
                 else None,
             )
-        self.question.read()  # read the inputs now, because they may be views of `out`
+        self.question.read()  # the inputs may be views of `out`, so they are read now
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a, because the check reads them again")
         return out.reshape(self.n, len(self.links), *own)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """Reshape a result (n, frames, ...) to the batch shape of the caller's q.
-
-        The result for a single frame has no axis for frames.
-        """
+        """Reshape a result (n, frames, ...) to the caller's batch shape; a single frame has no axis."""
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `evaluate`. If an input is not finite, raise an error with the name of its joint."""
+        """Call `evaluate`; if an input is not finite, raise an error with the name of its joint."""
         try:
             return evaluate(*arguments, **options)
         except NotFiniteError:
@@ -175,7 +170,7 @@ class Call:
         return Part(self.plan, self.reference, self.q[part], rates, state, query, self.options)
 
     def index(self, k: int) -> tuple[int, ...]:
-        """Convert the index k in the flat batch to indices in the caller's batch."""
+        """Convert an index in the flat batch to indices in the caller's batch."""
         return tuple(int(i) for i in np.unravel_index(k, self.shape)) if self.shape else ()
 
 
@@ -193,7 +188,7 @@ def _described(out: object) -> str:
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return whether `frame` is a list, and return its names. Unknown names are reported later."""
+    """Return whether `frame` is a list, and its names; unknown names are reported later."""
     if isinstance(frame, str):
         return False, (frame,)
     try:

@@ -1,7 +1,5 @@
 """Certificates, which record the checked and the unchecked results of a robot.
 
-For the checked results, a certificate also records the agreement with the oracle.
-
 The module also compares results within a bound, and defines the exception `VerificationError`.
 """
 
@@ -26,9 +24,9 @@ from urdfkin.verify.comparison import worst_of_each
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
-#: Text of the reason why results of calls with verify=False are unchecked.
+#: Reason why results of calls with verify=False are unchecked.
 NOT_ASKED_FOR = "the check was turned off by verify=False"
-#: A lock for the entries of all ledgers.
+#: Lock for the entries of all ledgers.
 _entering = lock_over_forks()
 
 
@@ -81,12 +79,10 @@ class VerificationError(UrdfkinError):
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Comparison of a batch of urdfkin's results with the oracle's results.
+    """Comparison of a batch of urdfkin's results (matrices or six-vectors) with the oracle's results.
 
     Attributes:
-        results: Number of results (matrices or six-vectors).
-        worst: Largest difference between a number in urdfkin's results and the same number in the oracle's
-            results, in multiples of eps * scale.
+        worst: Largest difference of two numbers, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
         index: Indices, in the array of results, of the result with the largest ratio `share`.
     """
@@ -98,11 +94,11 @@ class Comparison:
 
     @classmethod
     def of_nothing(cls) -> Comparison:
-        """Return the comparison of an empty batch. Its `agrees` is True."""
+        """Return the comparison of an empty batch, which agrees."""
         return cls(0, 0.0, 0.0, ())
 
     def __add__(self, other: Comparison) -> Comparison:
-        """Combine the comparisons of two batches into one comparison.
+        """Combine the comparisons of two batches.
 
         The `index` is the index from the batch with the larger ratio `share`. A ratio of NaN counts as larger
         than any number.
@@ -123,23 +119,15 @@ class Comparison:
 
 
 def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Comparison:
-    """Compare urdfkin's results with the oracle's results.
+    """Compare results of urdfkin and of the oracle; the first `axes` axes are not axes of one result.
 
-    Args:
-        ours: urdfkin's results. The remaining axes after the first `axes` are those of one result. For
-            placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
-        theirs: The oracle's results, of the same shape.
-        bound: Bound on the difference between `ours` and `theirs`.
-        axes: Number of leading axes that are not axes of one result.
+    For placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
     """
     return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
 
 
 def comparison_of(units: FloatArray, bound: Bound) -> Comparison:
-    """Compare the largest difference of each result with the result's bound.
-
-    The array `units` contains one difference for each result, in multiples of eps * scale.
-    """
+    """Compare the largest difference of each result, in multiples of eps * scale, with the result's bound."""
     if not units.size:
         return Comparison.of_nothing()
     share = units / result_k(bound, units.shape)
@@ -152,7 +140,6 @@ class Line:
     """The line of a certificate about one quantity.
 
     Attributes:
-        quantity: Name of the quantity.
         checked: Number of results that the oracle confirmed.
         worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
             scale.
@@ -197,7 +184,6 @@ class CertificateDocument(Header):
     ]
 
 
-#: The name, the version and the fields of a saved certificate.
 CERTIFICATE = Layout(
     "urdfkin-certificate/1",
     CertificateDocument,
@@ -326,7 +312,6 @@ class Account:
     """Numbers of checked and unchecked results of one quantity.
 
     Attributes:
-        checked: Combined comparison of all results that the oracle confirmed.
         unchecked: Number of results without a check: the oracle could not check them, or `verify="sample"`
             did not select them.
         not_asked_for: Number of results of calls with verify=False.
@@ -345,36 +330,31 @@ class Account:
         return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
     def line(self, quantity: str) -> Line:
-        """Return the line about this quantity for the certificate."""
         found = self.checked
         return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
 
 
 @dataclass
 class Ledger:
-    """Counts the checked and the unchecked results of a robot. Several threads may use the same ledger."""
+    """Counts the checked and the unchecked results of a robot; several threads may use the same ledger."""
 
     _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: str) -> Account:
-        """Return the account of a quantity. Later calls return the same object."""
+        """Return the account of a quantity; later calls return the same object."""
         if (known := self._accounts.get(quantity)) is not None:
             return known
         with _entering:
             return self._accounts.setdefault(quantity, Account())
 
     def checked(self, quantity: str, comparison: Comparison) -> None:
-        """Count results that the oracle confirmed."""
         account = self.account(quantity)
         with _entering:
             account.checked += comparison
 
     def unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Count results that were not checked.
-
-        The reason is None for calls with verify=False.
-        """
+        """Count results that were not checked; the reason is None for calls with verify=False."""
         account = self.account(quantity)
         with _entering:
             if reason is None:
@@ -384,7 +364,6 @@ class Ledger:
                 self._reasons[reason] = None
 
     def certificate(self, robot: str, oracle: str) -> Certificate:
-        """Return a certificate with the current entries of the ledger."""
         with _entering:
             found = [
                 (quantity, self._accounts[quantity]) for quantity in QUANTITIES if quantity in self._accounts
@@ -399,5 +378,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # A copy of a ledger contains no counts, because it may be in another process.
+        # A copy of a ledger has no counts, because it may be in another process.
         return type(self), ()

@@ -22,7 +22,7 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
-    """Compare a chain with Pinocchio's placements; return a line of text about the agreement.
+    """Return a line about the agreement of a chain with Pinocchio at q (n, nq); None: Pinocchio cannot check.
 
     Pinocchio's frame of a joint is the frame of the joint's child link. In a chain that leads from the parent
     link to the child link, this frame comes after the joint's motion. In a chain that leads from the child
@@ -30,14 +30,6 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     first and the last frame of the chain from the root. urdfkin computes along the chain, from the first
     frame to the last frame. The bound depends on all joints and lengths of the two paths from the root to
     these two frames. These paths contain every joint and length of both computations.
-
-    Args:
-        verifier: Verifier of the robot.
-        path: The chain.
-        q: (n, nq) configurations of the robot, rad, m.
-
-    Returns:
-        The line; None if Pinocchio cannot check the robot.
 
     Raises:
         TableError: the chain and Pinocchio differ by more than rounding.
@@ -78,10 +70,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
-    """Check the forward kinematics of an OPW solver, and return a sentence about its error.
-
-    If Pinocchio cannot check the robot, return None.
-    """
+    """Return a sentence about the error of an OPW solver's forward kinematics; None: no check is possible."""
     if verifier.cannot() is not None:
         return None
     q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
@@ -95,16 +84,7 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
 
 
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
-    """Compare a product of exponentials with Pinocchio's placements.
-
-    Return a line of text about the agreement.
-
-    Args:
-        verifier: Verifier of the robot.
-        screws: The product of exponentials.
-
-    Returns:
-        The line; None if Pinocchio cannot check the robot.
+    """Return a line about the agreement of a product of exponentials with Pinocchio; None: no check.
 
     Raises:
         TableError: the product of exponentials and Pinocchio differ by more than rounding.
@@ -117,7 +97,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     own = screws.coupling.select(verifier.tree, q)
     off = np.abs(base @ screws.placement(own) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes the poses of base and tip from the root. The product goes from the base to the tip.
+    # Pinocchio computes the poses of base and tip from the root; the product goes from base to tip.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + np.abs(own).sum(axis=-1)) + left_out(path)

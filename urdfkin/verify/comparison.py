@@ -15,8 +15,7 @@ from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
 
-#: The module with the compiled kernels of checks. `CHECKS` names the kernels that check one configuration.
-#: `_OF_BATCHES` names the kernel that only checks of batches use.
+#: `CHECKS` names the kernels that check one configuration, `_OF_BATCHES` the kernel of batches.
 KERNELS = "urdfkin.verify.kernels"
 CHECKS = "worst", "coupling"
 _OF_BATCHES = "lengths"
@@ -24,22 +23,14 @@ _NO_BITS = np.empty(0, dtype=np.int64)
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """Return the largest difference between the numbers of each result and the oracle's numbers.
+    """Return the largest difference of each result, in multiples of eps * scale (`bounds.disagreement`).
 
-    Args:
-        ours: urdfkin's results. The remaining axes after the first `axes` are those of one result. For
-            placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
-        theirs: The oracle's results, of the same shape.
-        scale: Scale of the bound. The shape of `scale` can be broadcast to the shape of the results.
-        axes: Number of leading axes that are not axes of one result.
-
-    Returns:
-        One difference for each result, in multiples of eps * scale (`bounds.disagreement`). The shape of the
-        array is the shape of the first `axes` axes.
+    The shape of the array is that of the first `axes` axes, which are not axes of one result. For placements
+    (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix. The scale can be broadcast to the
+    shape of the results.
     """
     leading, own = ours.shape[:axes], ours.shape[axes:]
     n, numbers = math.prod(leading), math.prod(own)
-    # a scale that is the same for all configurations is not copied
     shared = axes > 0 and scale.ndim == ours.ndim and len(scale) == 1
     shape = (1, *ours.shape[1:]) if shared else ours.shape
     one, other = _rows(ours, ours.shape, n, numbers), _rows(theirs, ours.shape, n, numbers)
@@ -51,7 +42,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        if len(size) < n:  # several results share a row of the scale: the kernel needs scratch memory
+        if len(size) < n:  # the kernel needs scratch memory if several results share a row of the scale
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)
         kernel(one, other, size, worst, out_bits, unit, units, bits)
@@ -59,7 +50,6 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
 
 
 def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
-    """Broadcast an array to `shape`, then reshape it to (n, numbers)."""
     if x.shape != shape:
         x = np.broadcast_to(x, shape)
     return np.ascontiguousarray(x).reshape(n, numbers)
@@ -67,10 +57,7 @@ def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatA
 
 @np.errstate(all="ignore")
 def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return the largest difference in each row, in multiples of eps * scale.
-
-    The difference is inf for a row with a number that is not finite.
-    """
+    """Return the largest difference in each row, in eps * scale; inf if a number is not finite."""
     difference = np.abs(ours - theirs)
     units = np.where(
         scale > 0.0,
@@ -83,10 +70,7 @@ def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArra
 
 
 def load_kernels() -> None:
-    """Compile all Numba kernels, or load them from disk, before worker processes start.
-
-    Otherwise each worker process would compile all kernels itself.
-    """
+    """Compile or load all Numba kernels, so that worker processes do not compile them."""
     preload.load_kernels()
     for name in (*CHECKS, _OF_BATCHES):
         preload.load(name, KERNELS)

@@ -1,14 +1,12 @@
 """Checks of quantities that are derived from several results of an oracle.
 
-| Quantity | Results of the oracle from which it is computed |
-|---|---|
-| analytical Jacobian | rotation and Jacobian, with `urdfkin.verify.analytical_reference` |
-| relative placement | placements of both frames in the world |
-| IMU reading | acceleration, placement and velocity |
+| Quantity | Results of the oracle from which it is computed | |---|---| | analytical Jacobian | rotation and
+Jacobian, with `urdfkin.verify.analytical_reference` | | relative placement | placements of both frames in the
+world | | IMU reading | acceleration, placement and velocity |
 
-urdfkin's forward recursion includes gravity as an acceleration of the base. The check of an IMU reading
-subtracts gravity at the end, in the sensor's axes. An error of sign or order in one of these two computations
-therefore leads to a disagreement.
+urdfkin's forward recursion includes gravity as an acceleration of the base, but the check of an IMU reading
+subtracts gravity at the end, in the sensor's axes. An error of sign or order in one of them therefore leads
+to a disagreement.
 """
 
 from __future__ import annotations
@@ -34,13 +32,8 @@ def check_analytical_jacobian(
 ) -> tuple[FloatArray, Bound]:
     """Return analytical Jacobians (n, frames, 6 or 7, nv) from an oracle, and their bound.
 
-    Args:
-        bound_of: Function for the bound of the velocity Jacobian.
-        oracle: The oracle's model of the robot.
-        x: The configurations.
-        ours: urdfkin's results. If rounding errors hide the sign of a quaternion, the oracle's quaternion
-            gets the sign of this result.
-        by: The oracle.
+    If rounding errors hide the sign of a quaternion, the oracle's quaternion gets the sign of urdfkin's.
+    `bound_of` computes the bound of the velocity Jacobian.
     """
     aligned = Reference.LOCAL_WORLD_ALIGNED
     J_v = oracle.jacobians(x.query._replace(reference=aligned))
@@ -51,8 +44,7 @@ def check_analytical_jacobian(
         quat = oracle.quaternions(x.query)
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs, hidden = quaternion_jacobian(quat, J_v), bounds.hidden_scalar(bound, quat.shape[:-1])
-        # The quaternions q and -q are the same rotation.
-        # The quaternion with qw >= 0 is used.
+        # The quaternions q and -q are the same rotation, and the one with qw >= 0 is used.
         # If rounding hides the sign of qw, both quaternions are accepted.
         with_other = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         turned = with_other & (np.abs(quat[..., 3]) <= hidden)
@@ -68,21 +60,15 @@ def check_relative_placement(
 ) -> tuple[FloatArray, Bound]:
     """Return the oracle's relative placements (n, frames, 4, 4), and the bound on urdfkin's error.
 
-    A relative placement is the pose of frame b relative to frame a. Let s_a and s_b be the path lengths of
-    the frames. Let k_a and k_b be the numbers of roundings of their placements. The position is R_a^T (p_b -
-    p_a). All errors below are in multiples of eps. The errors of p_a and p_b contribute at most k_b s_b + k_a
-    s_a to the error of the position. The error of R_a contributes at most k_a |p_b - p_a|. Since |p_b - p_a|
-    <= s_a + s_b, the sum of these errors is at most (2 k_a + k_b) (s_a + s_b). The error of the rotation
-    R_a^T R_b is at most k_a + k_b. Computing the difference p_b - p_a and the products causes a rounding
-    error of about 5 eps. This error needs no additional bound, because k_a and k_b each count one joint more
-    than the path contains.
-
-    Args:
-        bound_of: Function for the bound of placements in the world.
-        oracle: The oracle's model of the robot.
-        x: The configurations. Frame a is the last frame of `x.plan`.
-        ours: urdfkin's results, which this function does not use.
-        by: The oracle.
+    A relative placement is the pose of frame b relative to frame a, the last frame of `x.plan`. Let s_a and
+    s_b be the path lengths of the frames. Let k_a and k_b be the numbers of roundings of their placements.
+    The position is R_a^T (p_b - p_a). All errors below are in multiples of eps. The errors of p_a and p_b
+    contribute at most k_b s_b + k_a s_a to the error of the position. The error of R_a contributes at most
+    k_a |p_b - p_a|. Since |p_b - p_a| <= s_a + s_b, the sum of these errors is at most (2 k_a + k_b) (s_a +
+    s_b). The error of the rotation R_a^T R_b is at most k_a + k_b. Computing the difference p_b - p_a and the
+    products causes a rounding error of about 5 eps. This error needs no additional bound, because k_a and k_b
+    each count one joint more than the path contains. `bound_of` computes the bound of placements in the
+    world.
     """
     other = cast("str", x.options["relative_to"])
     T = oracle.placements(x.query._replace(frames=[*x.query.frames, other]))
@@ -100,18 +86,11 @@ _LOCAL = Reference.LOCAL
 
 
 def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary) -> tuple[FloatArray, Bound]:
-    """Return IMU readings (n, frames, 6) from an oracle, and their bound.
-
-    Args:
-        oracle: The oracle's model of the robot.
-        x: The configurations.
-        ours: urdfkin's results; not used.
-        by: The oracle.
-    """
+    """Return IMU readings (n, frames, 6) from an oracle, and their bound."""
     query, (v_flat, a_flat) = x.query._replace(reference=_LOCAL), x.rates
     gravity = np.asarray(x.options["gravity"], dtype=np.float64)
     R = oracle.placements(query)[..., :3, :3]
-    proper = oracle.accelerations(query)[..., :3] - gravity @ R  # R^T g
+    proper = oracle.accelerations(query)[..., :3] - gravity @ R  # the product is R^T g
     w = oracle.velocities(query)[..., 3:]
     size = by.size(magnitudes(x.plan, x.q, v_flat, a_flat, x.state))
     return np.concatenate((proper, w), axis=-1), bound_of(imu_scale(size, gravity), 3, size, _LOCAL)

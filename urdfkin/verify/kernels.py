@@ -36,10 +36,7 @@ _AHEAD = 4
 
 @helper(fastmath={"reassoc"})
 def _finite(x, i):
-    """Return whether a row is finite.
-
-    If x is not finite, 0 * x is NaN. Every sum that contains NaN is NaN.
-    """
+    """Return whether a row is finite; otherwise, 0 * x and the sum are NaN."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -48,7 +45,6 @@ def _finite(x, i):
 
 @helper(fastmath={"reassoc"})
 def _finite_difference(x, y, i):
-    """Return whether all numbers in the difference of two rows are finite."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * (x[i, j] - y[i, j])
@@ -64,10 +60,7 @@ def _units(difference, size):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
-    """Return the largest difference between two rows of finite numbers.
-
-    The scale is in row `k`. The compiler may reorder the comparisons.
-    """
+    """Return the largest difference between two rows of finite numbers; the scale is in row `k`."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _units(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -174,8 +167,7 @@ def coupling(full, columns, index, factor, out):
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
-#: The state of a link consists of `_STATE` values. The array `free` contains `_FREE` values for each planar
-#: and floating joint.
+#: Number of values in the state of a link, and in the array `free` for each planar or floating joint.
 _STATE = _FREE = 5
 
 
@@ -186,7 +178,7 @@ def _sum(x, y):
 
 @helper()
 def _product(x, y):
-    """Return the product of two lengths. It is equal to `urdfkin.kinematics.number_kinds.product`."""
+    """Return the product of two lengths, as `urdfkin.kinematics.number_kinds.product` does."""
     return SMALLEST if x * y < SMALLEST and x != 0.0 and y != 0.0 else x * y
 
 

@@ -1,11 +1,10 @@
 """Read an MJCF file in a process with limits on time and memory, and compare the robot with MuJoCo's model.
 
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
-the conversion from the MJCF file to the tree. Therefore `load` compares the tree with MuJoCo's own model of
-the file. `load` compares the placements of bodies and sites. `load` also compares the mimic rules of the tree
-with the joint equalities in MuJoCo's model. In addition, `load` compares the placements with those of
-Pinocchio's MJCF reader. Pinocchio's reader is known to read some files differently, so a difference from this
-reader is reported but is not an error.
+the conversion from the MJCF file to the tree. Therefore `load` compares the placements of bodies and sites
+with those of MuJoCo's own model of the file, and the mimic rules with the model's joint equalities. In
+addition, `load` compares the placements with those of Pinocchio's MJCF reader. Pinocchio's reader is known to
+read some files differently, so a difference from this reader is reported but is not an error.
 """
 
 from __future__ import annotations
@@ -31,17 +30,17 @@ from urdfkin.urdf.mjcf import Listed, is_text, name_of
 from urdfkin.urdf.mujoco import version
 from urdfkin.verify.bounds import Bound, about_the_root, magnitudes, mjcf_placement_bound, result_k
 from urdfkin.verify.comparison import worst_of_each
-from urdfkin.verify.mjcf_process import TOO_MUCH, unpacked
+from urdfkin.verify.mjcf_process import TOO_MUCH, complete_lines, unpacked
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
-#: Number of random configurations that are compared, in addition to the zero configuration.
+#: Number of random configurations besides the zero configuration.
 _SAMPLES = 8
 #: Time limit for reading a file, seconds.
 PATIENCE = 60.0
-#: Largest number of characters that a certificate quotes from a MuJoCo error.
+#: Largest number of quoted characters of a MuJoCo error.
 _QUOTED = 300
-#: Largest accepted size of the process's output, bytes.
+#: Largest accepted output of the process, bytes.
 MOST = 400_000_000
 
 
@@ -70,12 +69,9 @@ class MjcfReading:
 def read_mjcf(
     source: str | bytes | os.PathLike[str], *, check: bool = True, patience: float = PATIENCE
 ) -> MjcfReading:
-    """Read a robot from an MJCF file or text, in a process with limits on time and memory.
+    """Read a robot from an MJCF file, text or bytes, in a process with limits on time (s) and memory.
 
-    Args:
-        source: A path, a text or its bytes; included files are read too.
-        check: Whether to compute placements with MuJoCo too, for `check_mjcf_source`.
-        patience: Time limit, seconds.
+    With `check`, MuJoCo also computes placements, for `check_mjcf_source`. Included files are read too.
 
     Raises:
         InputError: MuJoCo is not installed, does not accept the file, or takes too much time or memory; or
@@ -102,7 +98,7 @@ def read_mjcf(
             "MuJoCo cannot compile this MJCF",
             where=name,
             found=ending,
-            remedy="check it for very large numbers, for example in <replicate>",
+            remedy="check the file for very large numbers, for example in <replicate>",
         )
     reasons = [answer["not_whole"] for answer in answers if "not_whole" in answer]
     return MjcfReading(
@@ -128,7 +124,7 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
     output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
-    answers = [json.loads(line) for line in output.splitlines(keepends=True) if _is_answer(line)]
+    answers = [json.loads(line) for line in complete_lines(output)]
     if status is None:
         return answers, f"MuJoCo did not finish within {patience:g} s"
     if len(output) > MOST:
@@ -136,23 +132,8 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
     return answers, f"MuJoCo's process ended with status {status}: perhaps {TOO_MUCH}"
 
 
-def _is_answer(line: bytes) -> bool:
-    """Return whether a line of the process's output is a complete answer.
-
-    Other lines are text that a library printed, or an incomplete answer of a process that was killed.
-    """
-    return line.startswith(b"{") and line.endswith(b"}\n")
-
-
 def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
-    """Compare a robot with MuJoCo's model of the MJCF file from which the robot was read.
-
-    Args:
-        verifier: Verifier of the robot.
-        read: The result of `read_mjcf`.
-
-    Returns:
-        A line of text about the result, for the certificate.
+    """Return a line about the comparison of a robot with MuJoCo's model of its MJCF file.
 
     Raises:
         OracleError: MuJoCo's placement of a body or site differs by more than the bound, or MuJoCo's model
@@ -163,8 +144,7 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # urdfkin and MuJoCo make rounding errors, and the angles in the URDF text are rounded too. Therefore, the
-    # bound is twice the bound for a comparison with MuJoCo on a URDF.
+    # The factor 2 covers the rounded angles in the URDF text besides the errors of urdfkin and MuJoCo.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -183,14 +163,14 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     if coupled is not None:
         line += f", and {len(answer['rules'])} mimic rules agree ({coupled:.1%})"
     if read.not_whole is not None:
-        line += f", without shapes and inertias: with them the file does not compile: {read.not_whole}"
+        line += f"; MuJoCo compiles the file only without shapes and inertias: {read.not_whole}"
     return f"{line}; {_pinocchios(read, ours, bound)}"
 
 
 def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Compare the mimic rules with the joint equalities in MuJoCo's model.
+    """Return the largest ratio of a mimic rule's difference from MuJoCo's joint equality to its bound.
 
-    Return the largest ratio of a difference to its bound. If there are no mimic rules, return None.
+    The result is None if there are no mimic rules.
     """
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])

@@ -1,13 +1,10 @@
 """Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader. This module runs in a separate process.
 
-A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory.
-A defect of a parser can crash the process. Therefore, a separate process compiles the file, and the caller's
-process receives only plain data. The request comes on standard input. Each answer is a line of JSON on
-standard output:
+A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory,
+or crash a parser. The request comes on standard input. Each answer is a line of JSON on standard output:
 
-1. the robot, compiled without its shapes
-2. the robot, compiled from the complete file
-3. the placements of the bodies by Pinocchio's reader
+1. the robot, compiled without its shapes 2. the robot, compiled from the complete file 3. the placements of
+the bodies by Pinocchio's reader
 
 If the process ends early, the answers that it has already written remain valid.
 """
@@ -36,7 +33,7 @@ from urdfkin.verify.pinocchio import pinocchio
 
 #: Number of coordinates of a free joint.
 _CARTESIAN = 7
-#: Largest number of names that an error message lists.
+#: Largest number of names in an error message.
 _NAMED = 5
 
 TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -46,7 +43,7 @@ def serve() -> None:
     """Read a request from standard input and write the answers to standard output."""
     request = json.load(sys.stdin)
     try:
-        # without this function, MuJoCo writes a log file
+        # MuJoCo writes a log file without this function.
         library().set_mju_user_warning(lambda message: None)
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
@@ -62,14 +59,11 @@ def serve() -> None:
     except Exception as error:
         message = f"{type(error).__name__}: {error}"
         _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": message[:2000]}})
-    os._exit(0)  # end the process without the exit handlers of the libraries
+    os._exit(0)  # the exit handlers of the libraries are skipped
 
 
 def _plain(found: str | None) -> str | None:
-    """Return MuJoCo's message.
-
-    When memory runs out, MuJoCo reports only "unknown exception". A hint is then added.
-    """
+    """Return MuJoCo's message, with a hint if MuJoCo reports lack of memory as "unknown exception"."""
     return f"{found} Perhaps {TOO_MUCH}" if found and found.endswith("unknown exception!") else found
 
 
@@ -78,13 +72,17 @@ def _say(answer: Mapping[str, Any]) -> None:
     sys.stdout.flush()
 
 
-def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the answers to a request.
+def complete_lines(output: bytes) -> list[bytes]:
+    """Return the answers in a process's output, without texts of libraries and lines cut off by a crash."""
+    lines = output.splitlines(keepends=True)
+    return [line for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
 
-    Args:
-        request: Mapping with the keys `path` or `text`, `name` and `samples`. `name` is the file's name in
-            messages. `samples` is the number of random configurations in addition to the zero configuration.
-            If `samples` is 0, the zero configuration is left out too.
+
+def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the answers to a request with the keys `path` or `text`, `name` (for messages) and `samples`.
+
+    `samples` is the number of random configurations besides the zero configuration. If it is 0, the zero
+    configuration is left out too.
     """
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
@@ -107,10 +105,7 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _configurations(read: Mjcf, samples: int) -> FloatArray:
-    """Return configurations (n, nq): the zero configuration and `samples` random configurations.
-
-    If `samples` is 0, there are no configurations.
-    """
+    """Return the zero configuration and `samples` random configurations (n, nq); none if `samples` is 0."""
     if not samples:
         return np.empty((0, read.tree.nq))
     drawn = sample(read.tree, samples, np.random.default_rng(0))
@@ -139,13 +134,12 @@ def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
 
 
 def packed(numbers: FloatArray) -> dict[str, Any]:
-    """Return an array as plain data for the JSON of an answer."""
+    """Return an array as plain data for JSON."""
     data = np.ascontiguousarray(numbers, dtype="<f8")
     return {"shape": data.shape, "base64": base64.b64encode(data.tobytes()).decode("ascii")}
 
 
 def unpacked(found: Mapping[str, Any]) -> FloatArray:
-    """Return the array that `packed` converted to JSON data."""
     numbers = np.frombuffer(base64.b64decode(found["base64"]), dtype="<f8")
     return numbers.reshape([int(n) for n in found["shape"]]).astype(np.float64)
 
@@ -162,15 +156,10 @@ def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
 def _pinocchio_placements(
     path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """Return the placements (n, bodies, 4, 4) of bodies that Pinocchio computes from an MJCF file.
+    """Return the placements (n, bodies, 4, 4) that Pinocchio computes from an MJCF file at MuJoCo's `qpos`.
 
-    The joints and bodies of Pinocchio and MuJoCo are matched by name.
-
-    Args:
-        path: The file.
-        qpos: (n, nq of MuJoCo) configurations.
-        coordinates: Index of each joint's first number in `qpos`.
-        bodies: Names of bodies.
+    The joints and bodies of Pinocchio and MuJoCo are matched by name. `coordinates` is the index of each
+    joint's first number in `qpos`.
 
     Raises:
         OracleError: Pinocchio does not accept the file, or reads other joints or bodies from it.
@@ -178,7 +167,7 @@ def _pinocchio_placements(
     pin = pinocchio()
     try:
         model = pin.buildModelFromMJCF(path)
-    except Exception as error:  # the exceptions that Pinocchio's parsers raise
+    except Exception as error:  # Pinocchio's parsers raise other types of exceptions
         raise OracleError("the reader does not accept the file", found=str(error).strip()) from error
     joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
@@ -206,8 +195,8 @@ def _pinocchio_placements(
 def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
     """Yield the name of each joint with its index in q and its number of coordinates.
 
-    Pinocchio combines several joints of a body into one joint. The name of the combined joint is `Composite_`
-    followed by the name of the first joint. In q, each of the original joints has one number.
+    Pinocchio combines several joints of a body into one joint, `Composite_` followed by the name of the first
+    joint. In q, each of the original joints has one number.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -28,34 +28,27 @@ from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.tables import TableError
 from urdfkin.verify.verifier import Verifier
 
-#: Number of random configurations that are compared, in addition to the zero configuration.
+#: Number of random configurations besides the zero configuration.
 _SAMPLES = 8
 
 
 def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
-    """Compare a robot's placements with the placements of the Pinocchio model from which it was made.
+    """Return a line about the comparison of a robot with the Pinocchio model from which it was made.
 
-    Args:
-        verifier: Verifier of the robot.
-        made: The tree that urdfkin made from the model, and the index of each link in the model.
-        source: The Pinocchio model, or a RobotWrapper that contains it.
-
-    Returns:
-        A line of text about the result, for the certificate.
+    `source` is the model, or a RobotWrapper that contains it.
 
     Raises:
         OracleError: a placement differs by more than the bound.
     """
     model, tree = getattr(source, "model", source), verifier.tree
-    if model.nv > MOST_RATES:  # the memory that Pinocchio needs grows with the cube of nv
+    if model.nv > MOST_RATES:  # Pinocchio's memory grows with the cube of nv
         return f"not compared with the model itself: nv is {model.nv}, more than {MOST_RATES}"
     q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # urdfkin and Pinocchio make rounding errors, and the angles in the URDF text are rounded too. Therefore,
-    # the bound is doubled.
+    # The factor 2 covers the rounded angles in the URDF text besides the errors of urdfkin and Pinocchio.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -72,10 +65,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
 
 
 def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
-    """Return the model's placements (n, links, 4, 4).
-
-    Placements of joints come before placements of frames.
-    """
+    """Return the model's placements (n, links, 4, 4): joints first, then frames."""
     pin = pinocchio()
     data = model.createData()
     out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
@@ -87,10 +77,7 @@ def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
 
 
 def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return configurations (n, model.nq) of the model for the tree's q.
-
-    Joints are matched by name.
-    """
+    """Return configurations (n, model.nq) of the model for the tree's q; joints are matched by name."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:
@@ -107,11 +94,7 @@ def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArra
 
 
 def check_table_source(verifier: Verifier, table: DHTable) -> None:
-    """Compare the robot that Pinocchio reads from the URDF with the table.
-
-    Args:
-        verifier: Verifier of the robot.
-        table: The table from which the robot was made.
+    """Compare the robot that Pinocchio reads from the URDF with the table from which the URDF was made.
 
     Raises:
         TableError: the placements of the tip differ by more than rounding.
@@ -122,7 +105,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # The rotation matrices of base and tool may be rounded to six digits. The URDF contains exact rotations.
+    # The table may round base and tool to six digits, but the URDF has exact rotations.
     rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
     turn = EPS * of_rows_read_back(rows) + defect
     allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
@@ -136,9 +119,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return |R^T R - 1| for the rotation matrix of the base plus the same norm for the tool.
-
-    The numbers of these matrices may be rounded to six digits.
-    """
+    """Return |R^T R - 1| of the base plus that of the tool, whose numbers may be rounded to six digits."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -44,23 +44,21 @@ from urdfkin.verify.oracle import (
 )
 from urdfkin.verify.pinocchio import depth_of
 
-#: Mass (kg) and moments of inertia (kg m^2) that each link has while MuJoCo reads the text.
+#: Mass (kg) and moments of inertia (kg m^2) of each link while MuJoCo reads the text.
 _MASS = "1"
-#: Longest chain of links that is accepted. MuJoCo rejects a robot with more than 1,023 links, but only after
-#: a time that grows with the square of the number of links.
+#: Longest accepted chain of links.
+#: MuJoCo rejects a robot with more than 1,023 links, but only after a time quadratic in that number.
 _DEEPEST = 1_000
-#: MuJoCo's joints for a planar or floating joint, in the order of its coordinates.
+#: MuJoCo's joints for the coordinates of a planar or floating joint, in order.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Numbers of coordinates and of joint velocities of a joint in urdfkin's layout.
+#: Numbers of coordinates and of joint velocities in urdfkin's layout.
 _ONE = ("revolute", "continuous", "prismatic")
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6), **dict.fromkeys(_ONE, (1, 1))}
 
 
 @dataclass(frozen=True, slots=True)
 class _Joint:
-    """A joint of the text, with the names of its parent and child links."""
-
     name: str
     kind: str
     parent: str
@@ -70,7 +68,7 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Indices of a moving joint in the vectors q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
+    """Indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
 
     The joints of a moving base have the indices q = v = -1, because they are not in urdfkin's q and v. A
     locked joint has the index v = -1, and its value is stored as the offset.
@@ -105,7 +103,7 @@ class MujocoOracle(Oracle):
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         moving = [joint.name for joint in joints if joint.kind != "fixed"]
         coupled = mimic_rules(text, moving, tree.name) if self.mimic else {}
-        held = locked_by_rules(self.lock, coupled)  # locked joints stay in MuJoCo's model, with these values
+        held = locked_by_rules(self.lock, coupled)  # locked joints stay in MuJoCo's model
         rules = self.rules([name for name in moving if name not in held])
         carrier = [_Joint("", "floating", "", links[0])] if self.moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *links])}
@@ -120,7 +118,6 @@ class MujocoOracle(Oracle):
     # -- the model -----------------------------------------------------------------------------------
 
     def _compiled(self, joints: Sequence[_Joint], root: str) -> Any:
-        """Return MuJoCo's model of the links and joints."""
         mujoco = self._mujoco
         robot = Element("robot", name="r")
         options = {"fusestatic": "false", "boundmass": "0", "boundinertia": "0"}
@@ -157,10 +154,10 @@ class MujocoOracle(Oracle):
         for tag, names in (("origin", ("xyz", "rpy")), ("axis", ("xyz",))):
             found = None if joint.element is None else joint.element.find(tag)
             if found is not None and found.get("quat_xyzw") is not None:
-                raise OracleError("MuJoCo does not know quat_xyzw", where=f"joint {joint.name}")
+                raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        if kind == "prismatic":  # required by MuJoCo, not used by its kinematics
+        if kind == "prismatic":  # MuJoCo requires limits, although its kinematics ignores them
             SubElement(element, "limit", lower="-1", upper="1")
         return element
 
@@ -208,7 +205,7 @@ class MujocoOracle(Oracle):
         poses, velocity, acceleration = self._moved(x, 3)
         if not Reference.of(x.reference).at_world:
             return _referred(x.reference, poses, acceleration)
-        # Move the spatial acceleration to the world origin, then convert it to the classical one.
+        # Only a spatial acceleration can be moved to the world origin.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
         out, there = _referred(x.reference, poses, spatial), _referred(x.reference, poses, velocity)
@@ -242,7 +239,7 @@ class MujocoOracle(Oracle):
         poses = self._poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
-        if which.own_axes:  # add the term of the rotating axes
+        if which.own_axes:  # the axes of the frame rotate
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(which, poses, rate, columns=True)
@@ -262,12 +259,9 @@ class MujocoOracle(Oracle):
         return self._poses(x, count, read), velocity, acceleration
 
     def _poses(self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]) -> FloatArray:
-        """Return placements (n, frames, 4, 4); call `read` for each sample and frame.
+        """Return placements (n, frames, 4, 4); call `read` (body, index) for each sample and frame.
 
-        Args:
-            x: The query.
-            count: Number of inputs that MuJoCo receives: 1 for q, 2 for q and v, 3 for q, v and a.
-            read: Function (body, index) that reads `self.data`.
+        MuJoCo receives the first `count` of the inputs q, v and a. The function `read` reads `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.index(name) for name in x.frames]
@@ -335,8 +329,7 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The base moves on three slide joints and a ball joint. The velocities of the slide joints are in
-            # world axes. The velocity of the ball joint is in the base's own axes.
+            # The base moves on three slide joints in world axes, and on a ball joint in its own axes.
             at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
@@ -376,10 +369,7 @@ class MujocoOracle(Oracle):
         return S_rate
 
     def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
-        """Return the rotation of a floating or planar joint, and the number of slide joints that replace it.
-
-        The rotation is an array (n, 3, 3) for a floating joint and (n, 2, 2) for a planar joint.
-        """
+        """Return the rotation (n, 3, 3) or (n, 2, 2) of a floating or planar joint, and its slide count."""
         own = q[:, place.q : place.q + 7]
         if place.kind == "floating":
             unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)
@@ -413,7 +403,7 @@ def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]
     for element in robot.iterfind("joint"):
         parent, child = (element.find(tag) for tag in ("parent", "child"))
         if parent is None or child is None:
-            raise ValueError(f"joint {element.get('name')} has no ends")
+            raise ValueError(f"joint {element.get('name')} has no parent or child link")
         words = (
             element.get("name", ""),
             element.get("type", ""),

@@ -53,16 +53,12 @@ from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, LinkFrame,
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.verify.comparison import KERNELS
 
-#: An array of indices, for example the index in urdfkin's v for each of Pinocchio's joint velocities.
+#: An array of indices, for example in urdfkin's v for Pinocchio's joint velocities.
 Places = np.ndarray[Any, np.dtype[np.int64]]
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Return the rule of each mimic joint relative to an independent joint; chains of rules are resolved.
-
-    Args:
-        text: The URDF text.
-        joints: Names of the moving joints; rules of other joints are ignored.
+    """Return the rule of each mimic joint in `joints` relative to an independent joint.
 
     Raises:
         ValueError: a multiplier or offset is not a number.
@@ -115,8 +111,7 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
     return {**lock, **moved}
 
 
-#: A joint of Pinocchio has nq coordinates and nv velocities. `_COORDINATES` contains, for each pair (nq, nv),
-#: the number of coordinates of the same joint in urdfkin.
+#: Number of coordinates in urdfkin of a joint with nq coordinates and nv velocities in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
@@ -124,8 +119,8 @@ _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 class _Place(NamedTuple):
     """First index of a joint's coordinates, first index of its joint velocities, and its mimic rule.
 
-    `full_q` and `full_v` are the indices in Pinocchio's vectors. `q` and `v` are the indices in urdfkin's
-    vectors. `sizes` is the joint's pair (nq, nv) in Pinocchio.
+    `full_q` and `full_v` are the indices in Pinocchio's vectors, `q` and `v` those in urdfkin's. `sizes` is
+    the joint's pair (nq, nv) in Pinocchio.
     """
 
     sizes: tuple[int, int]
@@ -177,17 +172,14 @@ class Layout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [place for place in self._places if place.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: True if Pinocchio's coordinates (or joint velocities) are the same numbers as the robot's.
+        #: True if Pinocchio's coordinates (or joint velocities) are the robot's numbers.
         plain = [(p.q, (1, 1), 1.0, 0.0) == (p.full_q, p.sizes, p.multiplier, p.offset) for p in self._places]
         self._same_q = all(plain) and model.nq == self.nq
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
-        """Return the data of all joints with the given pair (nq, nv) in Pinocchio.
-
-        The data are four arrays: indices in Pinocchio's q, indices in urdfkin's q, multipliers and offsets.
-        """
+        """Return indices in both vectors q, multipliers and offsets of the joints with one pair (nq, nv)."""
         own = [place for place in self._places if place.sizes == sizes]
         return (
             np.array([place.full_q for place in own], dtype=np.int64),
@@ -197,10 +189,7 @@ class Layout:
         )
 
     def _rates(self) -> tuple[Places, FloatArray]:
-        """Return two arrays over Pinocchio's joint velocities: the index in v, and the factor in G.
-
-        The index and the factor are 0 for the base's velocities.
-        """
+        """Return the index in v and the factor in G of each Pinocchio joint velocity; 0 for the base's."""
         index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
         for place in self._places:
             for c in range(place.sizes[1]):
@@ -260,9 +249,8 @@ class Frames:
         robot: Name of the robot, for errors.
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
-        carriers: Mapping from the index of a link's frame to the index of the frame of the link's parent
-            joint. This mapping leaves out each link whose frame has the same index as the frame of its parent
-            joint.
+        carriers: Index of the frame of the parent joint, by the index of a link's frame. Links whose frame
+            has the same index as the frame of the parent joint are left out.
     """
 
     def __init__(
@@ -307,14 +295,7 @@ class Frames:
 
 
 def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
-    """Return the indices of all frames of a model from Pinocchio's URDF parser.
-
-    Args:
-        model: The model.
-        pin: The module of Pinocchio.
-        stands_on_world: Whether the robot has a root joint. If the robot has a root joint, the world counts
-            as a link.
-    """
+    """Return the frames of a model from Pinocchio's URDF parser; with a root joint, the world is a link."""
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # the first frame is the world
@@ -366,8 +347,8 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # For a rotation, K + I = 4 q q^T. The computed q has small components along the other eigenvectors. The
-    # product (K + I) q removes them.
+    # The computed q has small components along the other eigenvectors.
+    # The product (K + I) q removes these components, because K + I = 4 q q^T for a rotation.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
@@ -398,11 +379,10 @@ def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     return turned.reshape(*turned.shape[:-2], 6)
 
 
-#: Largest number of names that an error lists.
+#: Largest number of names in an error.
 _NAMED = 5
 
-#: Names of a joint's coordinates and of its joint velocities. The keys are the numbers of joint velocities: 3
-#: for a planar joint, 6 for a floating joint.
+#: Names of the coordinates and of the joint velocities of a planar (3) and of a floating joint (6).
 _OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 _OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
@@ -429,10 +409,7 @@ class _Names:
             at += len(own) or 1
 
     def place(self, name: str) -> int | slice:
-        """Return the index of a coordinate, or the slice of a joint.
-
-        Raise OracleError for an unknown name.
-        """
+        """Return the index of a coordinate or the slice of a joint; raise OracleError for an unknown name."""
         if name in self._joints:
             at, own = self._joints[name]
             return slice(at, at + len(own)) if own else at
@@ -443,7 +420,6 @@ class _Names:
         raise OracleError("the robot has no coordinate with this name", found=repr(name[:60]))
 
     def pairs(self, text: str) -> list[tuple[str, str]]:
-        """Return the pairs (name, number) of a text with `NAME=NUMBER`."""
         plain = " ".join(text.split())
         plain = plain[1:-1].strip() if plain[:1] + plain[-1:] in ("[]", "()", "{}") else plain
         names = [
@@ -457,7 +433,6 @@ class _Names:
 
 
 def _number(text: str) -> float:
-    """Return the number in SI units."""
     found = parse_quantity(text)
     value = parse_float(text) if found is None else found.value
     if value is None:
@@ -483,10 +458,9 @@ class QueryBatch(NamedTuple):
             need.
         reference: The reference frame, as the user gave it. Placements ignore it.
         base: Motion of the base; None: fixed at the world origin.
-        joints: True: use the library's functions for joints, if it has them. Each frame is a `JointFrame`.
-        divided: True: the caller has divided a longer list of frames, and `frames` contains one part of this
-            list. Then the oracle uses its functions for several frames even for one frame, so that the
-            results are the same as for the whole list.
+        joints: True: use the library's functions for joints, if it has them.
+        divided: True: `frames` is one part of a longer list. Then the oracle uses its functions for several
+            frames even for one frame, so that the results are the same as for the whole list.
 
     >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
     >>> x.q.shape, x.v.shape, x.reference.name
@@ -502,17 +476,14 @@ class QueryBatch(NamedTuple):
 
     @property
     def q(self) -> FloatArray:
-        """Configurations (n, nq)."""
         return self.inputs[0]
 
     @property
     def v(self) -> FloatArray:
-        """Joint velocities (n, nv)."""
         return self.inputs[1]
 
     @property
     def a(self) -> FloatArray:
-        """Joint accelerations (n, nv)."""
         return self.inputs[2]
 
 
@@ -523,8 +494,7 @@ class OracleQuery:
         frame: Name of a frame, or several names.
         reference: A `Reference` or its name.
         base: Motion of the base; None: fixed at the world origin.
-        inputs: q, or q and v, or q, v and a, as arrays of numbers. Their batch shapes can differ (NumPy
-            broadcasting).
+        inputs: q, or q and v, or q, v and a, as arrays of numbers that can be broadcast.
         named: Original argument of each input, if this argument contains names; otherwise None.
         joints: Name and number of joint velocities of each joint with coordinates, in order.
     """
@@ -544,7 +514,7 @@ class OracleQuery:
         self._given, self._named, self._joints = inputs, named or [None] * len(inputs), joints
 
     def read(self) -> None:
-        """Convert the inputs now. The inputs may be views of `out`, which the computation overwrites."""
+        """Convert the inputs now; they may be views of `out`, which the computation overwrites."""
         _ = self._inputs
 
     @cached_property
@@ -557,7 +527,7 @@ class OracleQuery:
     def _by_name(
         self, x: FloatArray, given: str | Mapping[str, ArrayLike], of: Mapping[int, tuple[str, ...]]
     ) -> FloatArray:
-        """Replace the numbers in `x` that the user gave by name. Return `x`."""
+        """Return `x` with the numbers that the user gave by name."""
         names = _Names(self._joints, of)
         for name, value in given.items() if isinstance(given, Mapping) else names.pairs(given):
             x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
@@ -565,7 +535,6 @@ class OracleQuery:
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Batch shape of the result."""
         axes = [x.shape[:-1] for x in self._inputs]
         if self.base is not None:
             axes += [self.base.placement.shape[:-2], self.base.velocity.shape[:-1]]
@@ -574,7 +543,6 @@ class OracleQuery:
 
     @cached_property
     def n(self) -> int:
-        """Number of configurations."""
         return math.prod(self.shape)
 
     def rows(self, part: slice | IntArray) -> QueryBatch:
@@ -594,11 +562,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
-        """Reshape results from the user's shape to (n, frames, ...). One result has `axes` axes.
-
-        Raises:
-            OracleError: the shape does not match the query.
-        """
+        """Reshape results to (n, frames, ...); one result has `axes` axes. Other shapes raise OracleError."""
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
             raise OracleError(
@@ -608,11 +572,7 @@ class OracleQuery:
 
 
 def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
-    """Return the mimic rules of some joints of the text, read independently of urdfkin's reader.
-
-    Raises:
-        OracleError: a rule cannot be read.
-    """
+    """Return the mimic rules of some joints; raise OracleError if a rule cannot be read."""
     try:
         return rules_of_text(text, set(joints))
     except (ValueError, ExpatError) as error:
@@ -665,10 +625,7 @@ class Oracle:
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
     def rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
-        """Return the mimic rules of the text, read independently of urdfkin's reader.
-
-        Args:
-            joints: Names of the moving joints that the library found, in order.
+        """Return the mimic rules of the library's moving joints, read independently of urdfkin's reader.
 
         Raises:
             OracleError: the rules cannot be read, or the joints or their order differ from the tree's. The
@@ -690,10 +647,7 @@ class Oracle:
 
     @property
     def data(self) -> Any:
-        """The data structure of Pinocchio or MuJoCo for this robot.
-
-        Each thread has its own data structure.
-        """
+        """The data structure of the library for this robot; each thread has its own."""
         if not hasattr(self._local, "data"):
             self._local.data = self.new_data()
         return self._local.data
@@ -715,10 +669,7 @@ class Oracle:
         raise NotImplementedError
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians in blocks of configurations that fit into the cache.
-
-        A block is valid until the next block is requested, because the next block may overwrite it.
-        """
+        """Yield the Jacobians in blocks that fit into the cache; the next block may overwrite a block."""
         yield self.jacobians(x)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
@@ -726,11 +677,7 @@ class Oracle:
         raise NotImplementedError
 
     def hessians(self, x: QueryBatch) -> FloatArray:
-        """Return Hessians (n, frames, 6, nv, nv).
-
-        Raises:
-            OracleError: the library cannot compute the derivative of a Jacobian with respect to q.
-        """
+        """Return Hessians (n, frames, 6, nv, nv); raise OracleError if the library computes none."""
         raise OracleError(
             f"{self.title} computes no Hessian", where=self.tree.name, remedy="use oracle='pinocchio'"
         )
@@ -742,22 +689,14 @@ class Oracle:
 
 
 def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray, nv: int) -> FloatArray:
-    """Return the product J_full G, the Jacobian columns for urdfkin's joint velocities v.
+    """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
     For large batches, a compiled kernel reads all Jacobians from memory only once; NumPy would read them once
     for each column. With NumPy, adding the columns would take longer than Pinocchio's computation of the
     Jacobians. The kernel and NumPy return equal numbers.
 
-    Args:
-        full: (..., Pinocchio's nv) columns for all joints.
-        columns: Indices of the columns of J_full that the function adds, in the order of the additions.
-        index: (Pinocchio's nv,) index in v for each column of J_full.
-        factor: (Pinocchio's nv,) factor of each column of J_full. These factors are the nonzero elements of
-            G.
-        nv: Length of v.
-
-    Returns:
-        (..., nv).
+    The columns of J_full are added in the order of `columns`. For each column of J_full, `index` is an index
+    in v, and `factor` is the nonzero element of G.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:

@@ -15,7 +15,6 @@ from urdfkin.errors import UnknownNameError
 from urdfkin.errors.validators import as_str
 from urdfkin.system.lazy_import import installed_version, lazy_import
 
-#: Name of an oracle in arguments.
 OracleName = Literal["pinocchio", "mujoco"]
 
 
@@ -74,15 +73,9 @@ def _known(name: str) -> OracleLibrary:
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    """Return the oracle with the given name.
-
-    Raises:
-        UnknownNameError: there is no such oracle.
-        InputError: the oracle is not installed.
-    """
+    """Return the oracle with a name; raise UnknownNameError, or InputError if it is not installed."""
     wanted = as_str(name, "oracle")
-    oracle = next((one for one in ORACLES.values() if one.name == wanted), None)
-    if oracle is None:
+    if (oracle := ORACLES.get(wanted)) is None:
         raise UnknownNameError("oracle", wanted, ORACLES)
     if oracle is not PINOCCHIO:
         oracle.version()  # an error is raised now, not at the first check
@@ -95,7 +88,6 @@ def version(package: str) -> str:
 
 
 def versions(oracles: Iterable[str | None] = ()) -> dict[str, str]:
-    """Return the versions of urdfkin, its libraries and all oracles."""
     packages = ["urdfkin", "numpy", "numba", "yourdfpy", "example-robot-data"]
     packages += sorted({ORACLES[name].package for name in oracles if name in ORACLES})
     found = {package: version(package) for package in packages}

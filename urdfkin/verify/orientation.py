@@ -16,10 +16,10 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio import pinocchio
 
-#: Upper bound on the sum of the rounding errors of urdfkin and of Pinocchio, in eps. The error of urdfkin and
-#: the error of Pinocchio are less than 8 eps each. These errors are counted like the errors of a joint in
-#: `urdfkin.kinematics.roundings`. For angles, the operations are arctan2, sines, cosines and products of
-#: three numbers. For quaternions, the operations are a square root, a quotient and products of two numbers.
+#: Upper bound on the sum of the rounding errors of urdfkin and of Pinocchio, in eps.
+#: Each of the two errors is less than 8 eps, counted as in `urdfkin.kinematics.roundings`.
+#: For angles, the operations are arctan2, sines, cosines and products of three numbers.
+#: For quaternions, the operations are a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0
 
 

@@ -41,7 +41,7 @@ from urdfkin.verify.oracle import (
     mimic_rules,
 )
 
-#: Supported versions; the definitions of accelerations and J-dot were tested with them.
+#: The definitions of accelerations and J-dot were tested with these versions.
 _MAJOR = "4"
 _WANTED = "'pin>=4,<5'"
 
@@ -54,7 +54,7 @@ def pinocchio() -> Any:
             of the same name.
     """
     try:
-        import pinocchio as found  # noqa: PLC0415  a slow import, only for checks
+        import pinocchio as found  # noqa: PLC0415  Pinocchio takes long to import, and only checks need it
     except ImportError as error:
         if error.name == "pinocchio":
             raise InstallationError("Pinocchio is not installed", remedy=f"pip install {_WANTED}") from None
@@ -84,7 +84,6 @@ def version() -> str:
 
 
 def _impostor(found: Any) -> InstallationError:
-    """Return the error for the case that a different project is installed under Pinocchio's name."""
     file = found.__file__ or next(iter(found.__path__), "a folder without modules")
     owner = _owner(Path(file))
     cure = f"pip uninstall {owner[0]}" if owner else f"rename or remove {file}"
@@ -100,7 +99,7 @@ def _impostor(found: Any) -> InstallationError:
 
 def _owner(file: Path) -> tuple[str, str] | None:
     """Return the name and the version of the installed project that contains a file."""
-    from importlib import metadata  # noqa: PLC0415  for an error only
+    from importlib import metadata  # noqa: PLC0415  only an error needs this import
 
     for project in metadata.distributions():
         for one in project.files or ():
@@ -118,15 +117,15 @@ _SHALLOW = 100
 #: Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured), so the memory stays below 2 GB.
 MOST_RATES = 315
 
-#: Pinocchio's results are collected and copied to one array. `_AT_A_TIME` is the number of floating-point
-#: values that are copied at a time. They fit into the processor's cache.
+#: Number of floating-point values that are collected and then copied to one array.
+#: This number of values fits into the processor's cache.
 _AT_A_TIME = 16384
-#: Function that returns the results for the next configurations; the argument is their number.
+#: Function that returns the results for the given number of next configurations.
 _Next = Callable[[int], list[FloatArray]]
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
 
-#: Prefix of the names of links while Pinocchio reduces a model.
+#: Prefix of link names while Pinocchio reduces a model.
 _LINK_MARK = "\x01"
 
 
@@ -139,18 +138,17 @@ def build_model(
     lock: Mapping[str, float] = MappingProxyType({}),
     coupled: bool = True,
 ) -> Any:
-    """Return Pinocchio's model of a URDF text.
+    """Return Pinocchio's model of a URDF text, whose size urdfkin's tree gives.
 
     A robot that needs too much memory is rejected. A robot with a long chain of links is parsed with a larger
     stack. Otherwise such robots would crash the process.
 
     Args:
         text: The URDF text.
-        tree: urdfkin's tree of the text, which gives the size of the robot.
+        tree: urdfkin's tree of the text.
         root_joint: "floating" or "planar" to connect the root to the world by such a joint.
         mimic: True: the mimic joints move by their mimic rules. False: they are independent joints.
-        lock: Value (rad or m) of each locked joint. Pinocchio's `buildReducedModel` removes the locked joints
-            from the model.
+        lock: Value (rad or m) of each locked joint, which `buildReducedModel` removes from the model.
         coupled: Whether a locked joint locks its mimic joints too.
 
     Raises:
@@ -181,12 +179,11 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
     for i, (name, value) in zip(ids, held.items(), strict=True):
         if i >= model.njoints:
             raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
-        # with mimic=True, a mimic joint has nq = 0
+        # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
     # `buildReducedModel` finds frames by their names only, but a link may have the same name as a joint.
-    # Therefore, the names of the links have a prefix while Pinocchio builds the reduced model. No name in an
-    # XML text can contain this prefix.
+    # The prefix of the link names, which no XML text can contain, avoids this error.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_MARK + frame.name
@@ -204,7 +201,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `check` raises an error for each known reason why Pinocchio rejects a text. This reason is unknown.
+        # The reason is unknown: `check` raises an error for each known one.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -216,8 +213,6 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
 
 
 class PinocchioOracle(Oracle):
-    """Pinocchio's results for one robot."""
-
     title = "Pinocchio"
 
     def __init__(self, text: str, tree: KinematicTree, **how: Any) -> None:
@@ -234,11 +229,9 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Add a free-flyer joint for the base's motion in front of the model. An existing root joint is kept.
+        """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames.
 
-        Returns:
-            The new indices of the joints and of the frames. The frame of the world becomes the frame of the
-            base.
+        An existing root joint is kept. The frame of the world becomes the frame of the base.
         """
         pin, model, nowhere = self._pin, self._model, self._pin.SE3.Identity()
         # appendModel rejects a link with the name of a joint or of the free-flyer.
@@ -258,18 +251,16 @@ class PinocchioOracle(Oracle):
         )
 
     def _ids(self, x: QueryBatch) -> list[int]:
-        """Return Pinocchio's indices of the frames or joints."""
         if x.joints:
             return [self._joint_ids[name.partition(":")[2]] for name in x.frames]
         return [self._index[self._frames.index(name)] for name in x.frames]
 
     def _reference(self, reference: Reference | str) -> Any:
-        """Return Pinocchio's ReferenceFrame of a reference or its name."""
         name = reference.name if isinstance(reference, Reference) else str(reference).upper()
         return self._pin.ReferenceFrame.names[name]
 
     def _inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
-        """Convert urdfkin's q, v and a to Pinocchio's vectors. Only the first `count` inputs are converted.
+        """Convert the first `count` of urdfkin's inputs q, v and a to Pinocchio's vectors.
 
         Velocities and spatial accelerations of the free-flyer of a moving base are in the base's own axes.
         """
@@ -340,10 +331,7 @@ class PinocchioOracle(Oracle):
         return lambda n: list(islice(found, n))
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
-        """Return J-dot (n, frames, 6, nv) by `getFrameJacobianTimeVariation`.
-
-        Joints have their own function.
-        """
+        """Return J-dot (n, frames, 6, nv) by Pinocchio's functions for frames or for joints."""
         pin = self._pin
         get = pin.getJointJacobianTimeVariation if x.joints else pin.getFrameJacobianTimeVariation
         return self._columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
@@ -395,7 +383,6 @@ class PinocchioOracle(Oracle):
     def _each(
         self, function: Callable[..., Any], inputs: Sequence[FloatArray], *others: object
     ) -> Iterator[Any]:
-        """Call a function of Pinocchio for each configuration."""
         return map(function, repeat(self._model), repeat(self.data), *inputs, *map(repeat, others))
 
     def _collected(
@@ -407,10 +394,7 @@ class PinocchioOracle(Oracle):
         ids: Sequence[int],
         *reference: Any,
     ) -> FloatArray:
-        """Return results (n, ids, *own).
-
-        Call `compute` for each configuration, then `get` for each frame or joint.
-        """
+        """Return results (n, ids, *own): call `compute` for each configuration, then `get` for each id."""
         model, data, steps = self._model, self.data, self._each(compute, inputs)
         return _stacked(
             lambda n: [get(model, data, one, *reference) for _ in islice(steps, n) for one in ids],
@@ -430,14 +414,9 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     """Write the results of n configurations to `memory` in blocks. Yield the array of each block.
 
     If the results contain no numbers, nothing is computed. Pinocchio 4.1 crashes the process for a Jacobian
-    without columns, and returns a vector for one column.
-
-    Args:
-        compute: Function with the argument m, which returns the results of all frames for the next m
-            configurations.
-        n: Number of configurations.
-        memory: Array (rows, frames, ...) for the results. An array of n rows finally contains all results. In
-            a smaller array, each block overwrites the block before it.
+    without columns, and returns a vector for one column. The array `memory` has the shape (rows, frames,
+    ...). An array of n rows finally contains all results. In a smaller array, each block overwrites the block
+    before it.
     """
     if 0 in memory.shape:
         yield memory

@@ -1,10 +1,7 @@
 """The table of quantities: names, shapes, functions for computation and checks, bounds and help texts.
 
-Many parts of urdfkin use this table, for example the methods of `Robot`, the checks, reports and the command
-line. To add a quantity, add a row to this table. Then write the functions that the row names, and a page in
-docs.
-
-Functions are given by name and imported at first use, so that `--help` does not import NumPy.
+The methods of `Robot`, the checks, reports and the command line use this table. Functions are given by name
+and imported at first use, so that `--help` does not import NumPy.
 
 >>> for quantity in recursive_quantities():
 ...     print(quantity.name, quantity.inputs, quantity.shape)
@@ -35,15 +32,13 @@ if TYPE_CHECKING:
     from urdfkin.verify.bounds import Bound, Magnitudes
     from urdfkin.verify.oracle import Oracle, QueryBatch
 
-#: The rows of a velocity, an acceleration or a Jacobian.
+#: Rows of a velocity, an acceleration or a Jacobian.
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
-#: Function with the arguments (oracle, part, ours, by). It returns the oracle's results and the bound.
+#: Function (oracle, part, ours, by) that returns the oracle's results and the bound.
 Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
 def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], Any]:
-    """Return a function that calls the method `name` of an oracle with a query."""
-
     def ask(oracle: Any, x: QueryBatch) -> Any:
         return getattr(oracle, name)(x)
 
@@ -128,7 +123,6 @@ class Quantity:
 
     @property
     def columns(self) -> bool:
-        """True if the quantity has a column for each joint velocity."""
         return "nv" in self.shape
 
     @property
@@ -150,7 +144,6 @@ class Quantity:
         return found
 
     def bound(self, plan: CompiledTree, size: Magnitudes, reference: Reference | None) -> Bound:
-        """Return the bound on the difference between urdfkin's results and the oracle's results."""
         scale = self.scale(plan, size, *self._in(reference))
         bound: Bound = _bound(scale, self.factors, size, *self._in(reference))
         return bound
@@ -335,7 +328,7 @@ SCREWS = replace(
     head="data.J",
 )
 
-#: All quantities by name, in the order of certificates and reports.
+#: All quantities, in the order of certificates and reports.
 QUANTITIES = {
     row.name: row
     for row in (
@@ -362,17 +355,16 @@ def recursive_quantities(of: str = "frames") -> list[Quantity]:
 
 
 def validated(of: str = "frames") -> list[Quantity]:
-    """Return the quantities that a validation compares."""
     return [row for row in recursive_quantities(of) if row.validated]
 
 
 def compared() -> str:
-    """Return a text that lists the quantities that a validation compares."""
+    """Return words that list the quantities that a validation compares."""
     return _listed([row.title for row in validated()])
 
 
 def not_compared() -> str:
-    """Return the names of the quantities that a validation does not compare.
+    """Return words that list the quantities that a validation does not compare.
 
     A method of `Robot` that computes such a quantity checks each result.
     """
@@ -386,15 +378,12 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def by_command() -> dict[str, Quantity]:
-    """Return a mapping from the name of each urdfkin command to the quantity that the command computes."""
+    """Return the quantity that each urdfkin command computes, by the name of the command."""
     return {row.command: row for row in recursive_quantities() if row.command}
 
 
 def quantity(name: str) -> Quantity:
-    """Return the quantity with the given name.
-
-    Raise UnknownNameError, with the nearest names, if there is no such quantity.
-    """
+    """Return the quantity with a name; raise UnknownNameError with the nearest names."""
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)
     return found

@@ -11,16 +11,7 @@ from urdfkin.urdf.sources import Origin
 def replay_line(
     origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
 ) -> str:
-    """Return the shell command that computes one case again.
-
-    The numbers in the command have enough digits to be exact.
-
-    Args:
-        origin: Source of the robot. A robot given as text must be passed on standard input.
-        command: Name of the urdfkin command that computes the quantity.
-        frame: Name of a link or joint.
-        reference: Reference frame; None for a placement.
-        values: The numbers of those inputs q, v and a that the command needs.
+    """Return the shell command that computes one case again, with enough digits to be exact.
 
     >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
     "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"

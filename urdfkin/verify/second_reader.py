@@ -3,14 +3,9 @@
 Pinocchio checks the computed results. This module checks the data of the robot itself: links, joint kinds,
 origins, axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-Two faults of yourdfpy (0.0.60) with respect to the URDF specification are known. The report names these known
-faults and does not count them as differences:
-
-- The reader yourdfpy ignores the attribute `quat_xyzw` of an origin.
-- The reader yourdfpy does not normalise axes.
-
-If a number is missing in the URDF, yourdfpy returns None. Before the comparison, urdfkin replaces this None
-by the default value from the URDF specification.
+Two faults of yourdfpy (0.0.60) with respect to the URDF specification are named and do not count as
+differences: yourdfpy ignores the attribute `quat_xyzw` of an origin, and does not normalise axes. yourdfpy
+returns None for a missing number, which then counts as the default value of the specification.
 """
 
 from __future__ import annotations
@@ -22,7 +17,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,7 +31,7 @@ from urdfkin.verify.oracle import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Largest difference between the entries of two rotation matrices that are computed from the same angles.
+#: Largest difference between the entries of two rotation matrices from the same angles.
 #: In each computation, a sine and a cosine have an error of one eps each.
 #: Two products and a sum have an error of half an eps each.
 #: The sum of the terms is at most 1.
@@ -44,13 +39,13 @@ _ROTATION = 9.0 * EPS
 #: Largest difference between the components of two normalised axes.
 #: In each computation, the length has an error of 2 eps, and the quotient is rounded once.
 _AXIS = 5.0 * EPS
-#: If the length of an axis differs from 1 by more than this, the axis counts as not normalised.
+#: An axis counts as not normalised if its length differs from 1 by more than this number.
 _UNIT = 1e-6
 #: Largest number of differences, or of joints with a known fault, in a report.
 _LISTED = 8
-#: Largest number of characters that a report quotes from an error of yourdfpy.
+#: Largest number of quoted characters of an error of yourdfpy.
 _QUOTED = 200
-#: Kinds of joints with position limits. The specification ignores position limits of other kinds.
+#: The specification ignores position limits of other kinds of joints.
 _BOUNDED = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
@@ -61,10 +56,8 @@ class SecondReading:
     """Result of the comparison with yourdfpy's tree.
 
     Attributes:
-        by: Name and version of the reader.
         joints: Number of compared joints, fixed joints included.
-        differences: Differences between the trees of urdfkin and yourdfpy, caused by an error of urdfkin or
-            of yourdfpy.
+        differences: Differences between the trees, caused by an error of urdfkin or of yourdfpy.
         known: Differences that are known faults of yourdfpy.
         unread: Reason why yourdfpy cannot read the text; None if it can.
     """
@@ -75,27 +68,14 @@ class SecondReading:
     known: tuple[str, ...] = ()
     unread: str | None = None
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return {
-            "by": self.by,
-            "joints": self.joints,
-            "differences": list(self.differences),
-            "known": list(self.known),
-            "unread": self.unread,
-        }
-
 
 def second_reading(
     text: str, tree: KinematicTree, *, mimic: bool = True, root_joint: bool = False
 ) -> SecondReading:
     """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
 
-    Args:
-        text: The URDF text.
-        tree: urdfkin's tree of the same text.
-        mimic: Whether urdfkin's tree couples the mimic joints; otherwise the mimic rules are not compared.
-        root_joint: Whether `load` has added the first joint and link, which the text does not contain.
+    If `mimic` is False, urdfkin's tree does not couple the mimic joints, and the rules are not compared. If
+    `root_joint` is True, `load` has added the first joint and link, which the text does not contain.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
     if "<!DOCTYPE" in text:  # yourdfpy would read the files and entities that a document type names
@@ -130,12 +110,8 @@ def second_reading(
 
 
 def read(text: str) -> yourdf.Robot:
-    """Return yourdfpy's robot of a URDF text; no mesh is read.
-
-    Raises:
-        Exception: yourdfpy cannot read the text.
-    """
-    import yourdfpy  # noqa: PLC0415  imports trimesh
+    """Return yourdfpy's robot of a URDF text without meshes; yourdfpy may raise any exception."""
+    import yourdfpy  # noqa: PLC0415  yourdfpy imports trimesh
 
     # The text is now UTF-8, even if the file declares another encoding.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)

@@ -37,13 +37,7 @@ _SHOWN = 10
 
 
 class Between(NamedTuple):
-    """A computed value and guaranteed bounds on the true value, as three arrays of the same shape.
-
-    Attributes:
-        value: The computed value.
-        lower: Lower bound of the true value.
-        upper: Upper bound of the true value.
-    """
+    """A computed value and guaranteed bounds on the true value, as three arrays of the same shape."""
 
     value: FloatArray
     lower: FloatArray
@@ -220,15 +214,10 @@ def singular_values(
     rows: slice = slice(None),
     columns: FrameColumns | None = None,
 ) -> SingularValues:
-    """Return the singular values of some rows of Jacobians or other matrices, with guaranteed bounds.
+    """Return the singular values of some rows of finite matrices (..., m, nv), with guaranteed bounds.
 
-    Args:
-        J: (..., m, nv) finite matrices.
-        error: (..., m, nv) bound on the error of each number of J.
-        moving: (nv,) bool, False for columns that are 0 in every configuration.
-        rows: The rows to use.
-        columns: The Jacobian with the names of its frame and joints; None if the matrix is not a robot's
-            Jacobian.
+    `error` bounds the error of each number of J. `moving` (nv,) is False for columns that are 0 in every
+    configuration. `columns` is None if the matrix is not a robot's Jacobian.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
@@ -246,7 +235,7 @@ def singular_values(
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # A lower bound that is not finite is replaced by 0, and an upper bound that is not finite by inf.
+    # Bounds that are not finite become 0 and inf.
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 
@@ -261,7 +250,7 @@ def _skew(U: FloatArray) -> FloatArray:
 def _norm(E: FloatArray) -> FloatArray:
     """Return an upper bound (...) on the Frobenius norm of non-negative matrices (..., m, n)."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # a matrix that contains inf has the norm inf
+    # A matrix that contains inf has the norm inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))
@@ -269,10 +258,7 @@ def _norm(E: FloatArray) -> FloatArray:
 
 
 def _product(x: FloatArray) -> FloatArray:
-    """Return the product (...) of k numbers (..., k).
-
-    Intermediate products cannot overflow or underflow.
-    """
+    """Return the product (...) of k numbers (..., k); intermediate products cannot overflow or underflow."""
     mantissas, exponents = np.frexp(x)
     with np.errstate(over="ignore", under="ignore"):
         product: FloatArray = np.ldexp(mantissas.prod(axis=-1), exponents.sum(axis=-1))
@@ -286,10 +272,7 @@ def _up(x: FloatArray) -> FloatArray:
 
 
 def _down(x: FloatArray) -> FloatArray:
-    """Return a lower bound on the exact number whose rounded value is `x`.
-
-    If `x` is inf, the result is the largest double.
-    """
+    """Return a lower bound on the exact number whose rounded value is `x`; for inf, the largest double."""
     with np.errstate(under="ignore", invalid="ignore"):
         inside = np.nextafter(x - np.abs(x) * _OUTWARD, -np.inf)
     return np.where(np.isposinf(x), np.finfo(np.float64).max, inside)

@@ -24,12 +24,12 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: The search for sets of linearly dependent columns stops at `_LARGEST_SET` columns in a set. A Jacobian with
-#: more than `_MOST_COLUMNS` columns is not searched.
+#: The search for linearly dependent columns stops at sets of `_LARGEST_SET` columns.
+#: A Jacobian with more than `_MOST_COLUMNS` columns is not searched.
 _LARGEST_SET, _MOST_COLUMNS = 4, 16
-#: Rounding error of the singular value decomposition of a small matrix, in eps for each row or column.
+#: Rounding error of a small singular value decomposition, in eps for each row or column.
 _ROUNDINGS = 16.0
-#: At random configurations, a singular value below this fraction of the Jacobian's norm is treated as 0.
+#: At random configurations, a singular value below this fraction of the norm counts as 0.
 _USUAL = 1e-9
 
 
@@ -71,18 +71,7 @@ def columns_of(
     *,
     moving_base: bool,
 ) -> FrameColumns:
-    """Return a Jacobian with the names of its frame and of the joints of its columns.
-
-    Args:
-        tree: The robot.
-        J: (..., 6, nv) Jacobian at the frame's origin in world axes.
-        error: (..., 6, nv) bound on the error of each number of J.
-        frame: Name of the frame.
-        joints: (nv,) name of each column.
-        active: (6, nv) False for numbers of the Jacobian that are 0 for every q.
-        samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: Whether the user gives the base's motion.
-    """
+    """Return a Jacobian with its names; `FrameColumns` describes the arguments."""
     turns: list[bool | None] = [None] * len(joints)
     moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
     for i, joint in moving:
@@ -140,12 +129,7 @@ def explain(
 ) -> Singularity:
     """Return the rank of some rows of a Jacobian, and the reasons for a loss of rank.
 
-    Args:
-        columns: The Jacobian with the names of its frame and joints.
-        sample: Indices of the configuration in the batch.
-        rows: The rows to use.
-        lower: (k,) lower bounds of the singular values.
-        upper: (k,) upper bounds of the singular values.
+    The rank follows from the bounds (k,) of the singular values. `sample` is the index of the configuration.
     """
     rank, full = int((lower > 0.0).sum()), len(lower)
     nothing = np.zeros((0, 6)), np.zeros((0, columns.J.shape[-1]))
@@ -155,15 +139,6 @@ def explain(
 
 
 class _Explanation:
-    """The reasons for the loss of rank of one matrix.
-
-    Args:
-        columns: The Jacobian with the names of its frame and joints.
-        sample: Indices of the configuration in the batch.
-        rows: The rows to use.
-        rank: The rank of these rows.
-    """
-
     def __init__(self, columns: FrameColumns, sample: tuple[int, ...], rows: slice, rank: int) -> None:
         J, error = columns.J[sample], columns.error[sample]
         chosen = np.zeros(6, dtype=bool)
@@ -177,12 +152,7 @@ class _Explanation:
         self._names = [columns.joints[i] for i in self._moving]
 
     def result(self, full: int, least: float) -> Singularity:
-        """Return the rank with the lost directions and the reasons.
-
-        Args:
-            full: The largest possible rank.
-            least: Upper bound on the smallest singular value.
-        """
+        """Return the rank with lost directions and reasons; `least` bounds the smallest singular value."""
         U, s, Vt = np.linalg.svd(self._A)
         self._noise = (
             8.0
@@ -194,8 +164,8 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # If an arm has fewer joints than the Jacobian has rows, every configuration has directions in which
-        # the frame cannot move. These directions depend on the configuration.
+        # An arm with fewer joints than rows loses directions in every configuration.
+        # These directions depend on the configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -212,17 +182,14 @@ class _Explanation:
         return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
 
     def _of_samples(self) -> tuple[int, FloatArray]:
-        """Return the rank at random configurations, and the directions that are lost in all of them.
-
-        The directions are an orthonormal basis.
-        """
+        """Return the rank at random configurations, and an orthonormal basis of their lost directions."""
         samples = self._columns.samples()[:, self._rows[:, None], self._moving]
         usual = max(int(np.linalg.matrix_rank(one, tol=_USUAL * np.linalg.norm(one))) for one in samples)
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
         return usual, U[:, int((s > _USUAL * s[0]).sum()) :]
 
     def _without_noise(self, rows: FloatArray) -> FloatArray:
-        """Replace the numbers that are not larger than the error of the Jacobian by 0."""
+        """Return rows in which numbers below the error of the Jacobian are 0."""
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
     def _directions(self, lost: FloatArray) -> Iterator[str]:
@@ -277,7 +244,7 @@ class _Explanation:
         """Replace overlapping pairs of dependent columns by their union.
 
         For example, any two columns of three parallel prismatic joints are linearly dependent. These three
-        pairs of columns are replaced by one set of three columns.
+        pairs become one set of three columns.
         """
         joined: list[set[int]] = []
         if self._linear_only:
@@ -324,10 +291,9 @@ class _Explanation:
         return None
 
     def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
-        """Return the geometric reason why the columns of several revolute joints are linearly dependent.
+        """Return the geometric reason why columns of revolute joints are dependent, such as collinear axes.
 
-        The reason is, for example, that the axes are collinear. If no known reason applies, the result is
-        None.
+        If no known reason applies, the result is None.
         """
         indices = self._moving[list(one)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
@@ -339,23 +305,20 @@ class _Explanation:
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
-        # three linearly dependent directions lie in a plane; four directions are always dependent
+        # Three linearly dependent directions lie in a plane; four directions are always dependent.
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
-        # If all axes pass through one point a, each axis satisfies a x z = v. Here z is the direction of the
-        # joint axis. The vector v contains the linear velocity from the joint's Jacobian column.
-        crosses = np.concatenate([_cross_matrix(-axis) for axis in z])
+        # Axes through one point a satisfy a x z = v, for the direction z of each axis.
+        # The vector v is the linear part of the joint's Jacobian column.
+        crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
             return None
-        # If three lines through one point are linearly dependent, they lie in one plane.
+        # Three linearly dependent lines through one point lie in one plane.
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return the line that all joint axes intersect.
-
-        If the lost direction defines no such line, return None.
-        """
+        """Return a sentence about the line that all joint axes intersect; None: there is no such line."""
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -405,16 +368,9 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the vector space that the rows of a matrix span.
-
-    The rows are orthogonal projections of orthonormal vectors.
-    """
+    """Return an orthonormal basis of the row space of projections of orthonormal vectors."""
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding
-
-
-def _cross_matrix(z: FloatArray) -> FloatArray:
-    return np.array([[0.0, -z[2], z[1]], [z[2], 0.0, -z[0]], [-z[1], z[0], 0.0]])
 
 
 def _vector(x: FloatArray) -> str:

@@ -87,15 +87,11 @@ class TableCheck:
 
     @property
     def within(self) -> bool:
-        """True if every sample is within its bound."""
         return all(share <= 1.0 for share in self.shares.values())
 
     @property
     def agrees(self) -> bool:
-        """True if rounding and snapping explain the differences between table and Pinocchio.
-
-        Rounding includes the rounding errors of very large lengths in the table.
-        """
+        """True if snapping and rounding, also of very large lengths in the table, explain the differences."""
         return self.within or self.loss is not None
 
     def __str__(self) -> str:
@@ -106,8 +102,8 @@ class TableCheck:
             )
         bound = "rounding and snapping" if self.snapped else "rounding"
         figures = self.shares if self.snapped else self.units
-        unit = "of the bound" if self.snapped else "in eps*scale"
-        worst = ", ".join(f"{name} {_figure(value, self.snapped)}" for name, value in figures.items())
+        unit, form = ("of the bound", ".0%") if self.snapped else ("in eps*scale", ".2g")
+        worst = ", ".join(f"{name} {value:{form}}" for name, value in figures.items())
         verdict = f"agrees within {bound}" if self.agrees else f"DISAGREES by more than {bound}"
         return (
             f"{verdict} on {self.samples} samples: tip within {self.metres:.2e} m and {self.radians:.2e} rad;"
@@ -115,19 +111,8 @@ class TableCheck:
         )
 
 
-def _figure(value: float, share: bool) -> str:
-    return f"{value:.0%}" if share else f"{value:.2g}"
-
-
 def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> TableCheck:
-    """Compare a table of `tree` with Pinocchio.
-
-    Args:
-        oracle: Pinocchio's model of the same robot.
-        tree: The robot.
-        table: A table with a base and a tip that are frames of the robot.
-        samples: Configurations, joint velocities and joint accelerations of the robot.
-    """
+    """Compare a table between two frames of `tree` with Pinocchio's model `oracle` of the same robot."""
     own_q = table.coupling.select(tree, samples.q)
     columns = list(table.coupling.v_index(tree))
     own_v, own_a = samples.v[:, columns], samples.a[:, columns]
@@ -172,8 +157,6 @@ def _loss(table: DHTable) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Apart:
-    """Differences between a table and Pinocchio in position, angle, Jacobian and acceleration."""
-
     metres: FloatArray
     radians: FloatArray
     jacobian: FloatArray
@@ -274,11 +257,7 @@ class Sizes:
 
 
 def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
-    """Return the lengths and velocities to which the bounds are proportional.
-
-    The lengths are those of the paths from the root to the table's base and tip, because Pinocchio computes
-    both frames from the root.
-    """
+    """Return the sizes of the paths from the root, from which Pinocchio computes both frames of the table."""
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
     names, joints, tilt = table.joint_names, 0, 0.0
@@ -304,9 +283,9 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # Each joint on the two paths and each row of the table adds rounding errors. `Joint.tilt` is the angle
-    # between the axis of a joint in urdfkin and in Pinocchio. The factor is 4, because a term of the relative
-    # acceleration is a product of up to four rotated vectors.
+    # Each joint on the two paths and each row of the table adds rounding errors.
+    # `Joint.tilt` is the angle between the axis of a joint in urdfkin and in Pinocchio.
+    # The factor is 4, because a term of the relative acceleration has up to four rotated vectors.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)

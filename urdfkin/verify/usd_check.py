@@ -43,47 +43,27 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.usd import Remark, version
-from urdfkin.verify.mjcf_process import unpacked
+from urdfkin.verify.mjcf_process import TOO_MUCH, complete_lines, unpacked
 from urdfkin.verify.quantities import PLACEMENT
-from urdfkin.verify.usd_process import TOO_MUCH
 from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 PATIENCE = 60.0
-#: Largest accepted size of the process's output, bytes.
+#: Largest accepted output of the process, bytes.
 _MOST = 400_000_000
-#: Bound on the angle error (rad) of a joint's rotation in OpenUSD's parser, divided by `SINGLE`. `SINGLE` is
-#: the relative error of one rounding to single precision. If the four numbers of a quaternion are rounded,
-#: the rotation angle changes by at most 2 `SINGLE`. The product of two quaternions adds an error of 4
-#: `SINGLE` to each of the four numbers. The vector of these four errors has the length 8 `SINGLE`. The angle
-#: error is twice this length, that is, 16 `SINGLE`.
+#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE` (derived in `_demand`).
 _ROTATION = 18.0
-#: Number of roundings in the computation of a joint's origin. The scale factor is rounded. Its product with
-#: the origin is rounded. The transformed origin is rounded.
+#: Number of roundings in a joint's origin (`_demand`).
 _ORIGIN = 3.0
-#: Bound on the angle error (rad) of one operation of a prim's transform, divided by u = `SINGLE`. A rotation
-#: from angles consists of at most three rotations of at most one turn. The error of each is at most 2 pi u,
-#: so their sum is at most 6 pi u. A quaternion has four rounded numbers. Their errors form a vector whose
-#: length is at most u. The component of this vector perpendicular to the quaternion changes the rotation by
-#: at most 2 u. The component parallel to the quaternion changes the length of the quaternion by at most u.
-#: UsdGeom does not normalize a quaternion. Therefore, this component changes a rotation by the angle t by at
-#: most 2 u sin t. The sum of both changes is at most 4 u. A matrix has nine rounded numbers. Their errors
-#: form a vector whose length is at most sqrt(3) u. Normalizing the rows does not make this vector longer. A
-#: rotation by a small angle t changes the matrix by a vector of length sqrt(2) t. Therefore, the error of the
-#: rotation is at most sqrt(3/2) u. The bound is the largest of these three values. `_at_rest` counts one
-#: operation for each joint on the path.
+#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE` (`_at_rest`).
 _TRANSFORM = 6.0 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
 class UsdReading:
-    """The result of reading a USD stage in a separate process, as plain data.
+    """The tree of a USD stage as a URDF text, and the answer of the process that read the stage.
 
-    Attributes:
-        urdf: The tree as a URDF text.
-        remarks: Parts of the stage that the tree does not contain, and probable mistakes.
-        path: The file.
-        answer: The process's answer.
+    The remarks are about parts of the stage that the tree does not contain, and about probable mistakes.
     """
 
     urdf: str
@@ -97,17 +77,12 @@ def read_usd(
     *,
     variants: Sequence[tuple[str, str]] = (),
     articulation: str | None = None,
-    check: bool = True,
     patience: float = PATIENCE,
 ) -> UsdReading:
-    """Read the robot of a USD file in a process with limits on time and memory.
+    """Read the robot of a USD file in a process with limits on time (s) and memory.
 
-    Args:
-        source: The path of a .usd, .usda, .usdc or .usdz file; the files that it refers to are read too.
-        variants: (variant set, variant) to select.
-        articulation: Path or name of the articulation; None if there is only one.
-        check: Whether to read the stage with OpenUSD's readers too, for `check_usd_source`.
-        patience: Time limit, seconds.
+    The pairs (variant set, variant) are selected. `articulation` is a path or a name; None: there is only
+    one. OpenUSD's readers also read the stage and the files that it refers to, for `check_usd_source`.
 
     Raises:
         SourceError: the file cannot be read or is too large.
@@ -122,16 +97,13 @@ def read_usd(
         "name": str(path),
         "variants": [list(pair) for pair in variants],
         "articulation": articulation,
-        "check": check,
         "seconds": ceil(patience) + 1,
     }
     command = own_python(
         "from urdfkin.verify.usd_process import serve; serve()", options=("-B", "-X", "utf8")
     )
     output, status = ask_python(command, json.dumps(request).encode(), patience, _MOST)
-    lines = [
-        line for line in output.splitlines(keepends=True) if line.startswith(b"{") and line.endswith(b"}\n")
-    ]
+    lines = complete_lines(output)
     if not lines or len(output) > _MOST:
         ending = f"its process ended with status {status}: perhaps {TOO_MUCH}"
         if status is None:
@@ -152,12 +124,7 @@ def read_usd(
 def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
     """Compare a robot with OpenUSD's readings of the stage from which the robot was read.
 
-    Args:
-        verifier: Verifier of the robot.
-        read: The result of `read_usd`.
-
-    Returns:
-        Two values: a sentence for the certificate, and remarks about prims whose placements differ.
+    The result is a sentence for the certificate, and remarks about prims whose placements differ.
 
     Raises:
         OracleError: OpenUSD's parser and urdfkin disagree about a joint.
@@ -173,9 +140,13 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
 
 
 def _demand(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
-    """Compare urdfkin's and OpenUSD's data of a joint.
+    """Return the largest ratio of a difference between urdfkin's and OpenUSD's data of a joint to its bound.
 
-    Return the largest ratio of a difference to its bound.
+    Let u = `SINGLE` be the relative error of one rounding to single precision. If the four numbers of a
+    quaternion are rounded, the rotation angle changes by at most 2 u. The product of two quaternions adds an
+    error of 4 u to each of the four numbers. The vector of these four errors has the length 8 u. The angle
+    error is twice this length, that is, 16 u. The sum is `_ROTATION` u. An origin has `_ORIGIN` roundings: of
+    the scale factor, of its product with the origin, and of the transformed origin.
     """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
@@ -212,8 +183,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Mapping from the name of a joint to five numbers. The numbers describe the effect of rounding to single
-#: precision (see `urdfkin.urdf.usd.Usd.single`).
+#: Five numbers for each joint about rounding to single precision (`urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -252,11 +222,8 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     the revolute joint. `single` has no entry for this fixed joint, because the entry of the revolute joint
     includes the errors of B. For all other joints, `single` contains |p| as the last of five numbers. A
     locked prismatic joint also displaces the child link by its value q. The absolute value of q is at most
-    the length of the joint's constant offset plus the lengths of the two origins.
-
-    Args:
-        tree: The robot.
-        single: Five numbers for each joint. A joint without an entry in `single` has no rounding errors.
+    the length of the joint's constant offset plus the lengths of the two origins. A joint without an entry in
+    `single` has no rounding errors.
     """
     out, own = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
@@ -278,12 +245,24 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
 
 
 def _largest(joint: Joint) -> float:
-    """Return the largest absolute value (rad or m) that a joint's limits allow."""
     return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
 
 
 def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[Remark, ...]]:
-    """Compare the placements of links with the transforms of their prims, in the stage's configuration."""
+    """Compare the placements of links with the transforms of their prims, in the stage's configuration.
+
+    The angle error of one operation of a transform is at most `_TRANSFORM` u, with u = `SINGLE`. A rotation
+    from angles consists of at most three rotations of at most one turn. The error of each is at most 2 pi u,
+    so their sum is at most 6 pi u. A quaternion has four rounded numbers. Their errors form a vector whose
+    length is at most u. The component of this vector perpendicular to the quaternion changes the rotation by
+    at most 2 u. The component parallel to the quaternion changes the length of the quaternion by at most u.
+    UsdGeom does not normalize a quaternion. Therefore, this component changes a rotation by the angle t by at
+    most 2 u sin t. The sum of both changes is at most 4 u. A matrix has nine rounded numbers. Their errors
+    form a vector whose length is at most sqrt(3) u. Normalizing the rows does not make this vector longer. A
+    rotation by a small angle t changes the matrix by a vector of length sqrt(2) t. Therefore, the error of
+    the rotation is at most sqrt(3/2) u. `_TRANSFORM` u is the largest of these three values. Each joint on
+    the path counts as one operation.
+    """
     prims: dict[str, str] = answer["prims"]
     rows = unpacked(answer["rest"])
     rest = np.array([pose(row[:, :3], row[:, 3]) for row in rows])
@@ -317,11 +296,16 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
     moved = (
         int(np.count_nonzero(np.abs(q) > 0.0)) if not any(joint.kind.nq > 1 for joint in tree.joints) else 0
     )
-    where = f"at the stage's configuration, with {moved} joints off zero" if moved else "at q = 0"
+    where = (
+        f"at the stage's configuration, with {moved} joint{'s' * (moved > 1)} not at zero"
+        if moved
+        else "at q = 0"
+    )
     if remarks:
-        words = f"by UsdGeom's transforms {len(remarks)} of the {len(prims)} prims are elsewhere, by up to"
-        words = f"{words} {worst[0]:.3g} m"
-        # an error of one body moves all bodies after it, so only the first is reported
+        words = (
+            f"UsdGeom places {len(remarks)} of the {len(prims)} prims elsewhere, by up to {worst[0]:.3g} m"
+        )
+        # Only the first difference counts, because an error of one body moves all bodies after it.
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

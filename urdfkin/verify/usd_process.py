@@ -1,12 +1,10 @@
 """Program that reads a USD stage in a separate process, with urdfkin's reader and with OpenUSD's own.
 
-A defect of OpenUSD's parsers, which are written in C++, can crash the process. A stage can require any amount
-of time and memory. The caller's process receives only plain data. The request comes on standard input. The
-answer is a line of JSON on standard output.
+A stage can require any amount of time and memory, or crash OpenUSD's parsers, which are written in C++. The
+request and the answer are JSON on standard input and standard output.
 
-OpenUSD contains a second reader of the joints: the parser of its package UsdPhysics. This parser resolves
-bodies, joint frames and limits with other code than `urdfkin.urdf.usd`. The answer contains the numbers of
-both readers.
+The parser of OpenUSD's package UsdPhysics resolves bodies, joint frames and limits with other code than
+`urdfkin.urdf.usd`. The answer contains the numbers of both readers.
 """
 
 from __future__ import annotations
@@ -22,12 +20,10 @@ from typing import Any
 import numpy as np
 
 from urdfkin.errors import UrdfkinError
-from urdfkin.urdf.confinement import MEMORY, limit
+from urdfkin.urdf.confinement import limit
 from urdfkin.urdf.usd import JointReading, Usd, library, read_usd
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verify.mjcf_process import packed
-
-TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+from urdfkin.verify.mjcf_process import TOO_MUCH, packed
 
 
 def serve() -> None:
@@ -51,40 +47,30 @@ def serve() -> None:
         }
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
-    os._exit(0)  # end the process without the exit handlers of the libraries
+    os._exit(0)  # the exit handlers of the libraries are skipped
 
 
 def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the answer to a request.
-
-    Args:
-        request: Mapping with `path`, `name` (the file's name in messages), `variants`, `articulation`, and
-            `check` (whether to compare with OpenUSD's readers).
-    """
+    """Return the answer to a request, with the data of OpenUSD's readers."""
     read = read_usd(
         request["path"],
         request["name"],
         variants=[tuple(pair) for pair in request["variants"]],
         articulation=request["articulation"],
     )
-    answer: dict[str, Any] = {
+    return {
         "urdf": to_urdf(read.tree),
         "single": read.single,
         "remarks": [astuple(one) for one in read.remarks],
-        "files": read.files,
         "prims": read.prims,
+        "rest": packed(read.rest[:, :3]),
+        "rest_q": read.rest_q.tolist(),
+        "joints": _second_reading(read),
     }
-    if request["check"]:
-        answer |= {
-            "rest": packed(read.rest[:, :3]),
-            "rest_q": read.rest_q.tolist(),
-            "joints": _second_reading(read),
-        }
-    return answer
 
 
 def _second_reading(read: Usd) -> dict[str, Any]:
-    """Return urdfkin's and OpenUSD's data of each joint. The keys are the paths of the joints' prims."""
+    """Return urdfkin's and OpenUSD's data of each joint, by the path of the joint's prim."""
     pxr = library()
     physics, found = pxr.UsdPhysics, {}
     load = getattr(physics, "UsdPhysicsLoadStageFromPrimRange", None) or physics.LoadUsdPhysicsFromRange
@@ -93,7 +79,7 @@ def _second_reading(read: Usd) -> dict[str, Any]:
         parsed = load(read.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
-            # a joint with PhysicsArticulationRootAPI has another description, that of the articulation
+            # A joint with PhysicsArticulationRootAPI has a second description, that of the articulation.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _described(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
@@ -110,7 +96,7 @@ def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
-        ends = own.get(free.lower())  # None if several directions are free
+        ends = own.get(free.lower())  # `ends` is None if several directions are free
     factor = np.pi / 180.0 if free.startswith("rot") else read.unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)
@@ -124,12 +110,8 @@ def _freedoms(physics: Any, one: Any) -> str:
         if isinstance(one, kind):
             return f"{word}{str(one.axis).rpartition('.')[2][-1].upper()}"
     if isinstance(one, physics.D6JointDesc):
-        names = {"Trans": "trans", "Rot": "rot"}
-        locked = set()
-        for pair in one.jointLimits:
-            word = str(pair.first).rpartition(".")[2]
-            if pair.second.lower > pair.second.upper:
-                locked.add(next(names[k] + word[len(k) :] for k in names if word.startswith(k)))
+        ranges = [(str(pair.first).rpartition(".")[2], pair.second) for pair in one.jointLimits]
+        locked = {word[0].lower() + word[1:] for word, ends in ranges if ends.lower > ends.upper}
         return " ".join(
             freedom
             for freedom in ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")

@@ -46,21 +46,18 @@ if TYPE_CHECKING:
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Number of random configurations in the check of a table; the zero configuration and the limits are added.
+#: Number of random configurations in the check of a table; zero and limits are added.
 TABLE_SAMPLES = 40
 
-#: True: check all results of a call.
-#: False: check none.
-#: The string "sample": check the results of `SAMPLE` configurations.
+#: True checks all results of a call, and False none.
+#: "sample" checks the results of `SAMPLE` configurations.
 Verify = bool | Literal["sample"]
 
-#: Number of configurations of a call that `verify="sample"` checks.
 SAMPLE = 100
 
-#: A large batch is compared in parts, which limits the memory. `_AT_A_TIME` is the largest number of values
-#: in a part. `_MOST` is the largest number of configurations in a part. A part is large enough for efficient
-#: array expressions, and it fits into the processor's cache.
+#: Largest number of values in a part of a large batch; such a part fits into the processor's cache.
 _AT_A_TIME = 262_144
+#: Largest number of configurations in a part.
 _MOST = 4096
 
 
@@ -79,8 +76,7 @@ class Verifier:
     Args:
         text: The URDF text that Pinocchio reads.
         tree: urdfkin's tree of the same text.
-        origin: The arguments of `load`. Error messages contain a command that loads the robot with these
-            arguments and repeats a failed computation.
+        origin: The arguments of `load`, for commands in error messages that repeat a failed computation.
         policy: Default of `verify` in calls.
         mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
         unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
@@ -89,8 +85,7 @@ class Verifier:
 
     Attributes:
         ledger: Record of checked and unchecked results.
-        reading: Result of the check of the conversion to URDF, if the robot was read from another format.
-            Empty for a URDF.
+        reading: Result of the check of the conversion to URDF from another format; empty for a URDF.
     """
 
     def __init__(
@@ -112,14 +107,11 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Pinocchio's models are rebuilt when needed. A copy of a verifier has not yet checked any results, so
-        # the copy gets a new, empty ledger.
+        # A copy has no checked results yet, and it builds Pinocchio's models again.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle's model of the robot, which is built once.
-
-        If the base moves, the model's root is on a free-flyer.
+        """Return the oracle's model of the robot, which is built once; for a moving base, on a free-flyer.
 
         Raises:
             OracleError: the oracle does not accept the text, or reads other joints from it.
@@ -155,12 +147,7 @@ class Verifier:
         )
 
     def locked(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        """Return the verifier of the robot with locked joints: the same text, and Pinocchio's reduced model.
-
-        Args:
-            tree: The tree with the locked joints.
-            lock: Name and value of each newly locked joint.
-        """
+        """Return the verifier of the robot with more locked joints, with Pinocchio's reduced model."""
         # Pinocchio may refuse a robot with many joints, and accept it with fewer.
         known = self.unverifiable if self.unverifiable not in self._refusals.values() else None
         found = Verifier(
@@ -189,23 +176,15 @@ class Verifier:
         return self._refusals.get(by.name)
 
     def wanted(self, verify: Verify | None) -> Verify:
-        """Return the value of `verify` for a call.
-
-        If `verify` is None, return the robot's default `policy`.
-        """
+        """Return the valid value of `verify` for a call; None stands for the robot's default `policy`."""
         return checked_choice(self.policy if verify is None else verify)
 
     def ready(self, verify: Verify | None) -> None:
-        """Import Pinocchio before the computation if the results of the computation need a check.
-
-        Raises:
-            InstallationError: Pinocchio is missing, or a different project has its name.
-        """
+        """Import Pinocchio before a computation with a check; raise InstallationError without Pinocchio."""
         if self.wanted(verify) is not False and self.unverifiable is None and self.library is PINOCCHIO:
             pinocchio()
 
     def certificate(self) -> Certificate:
-        """Return the record of all checks so far: the oracle, the agreement, and the unchecked results."""
         return replace(
             self.ledger.certificate(self.tree.name, self.library.words),
             reading="; ".join(filter(None, (self.reading, self.origin.lock_words))),
@@ -217,16 +196,14 @@ class Verifier:
     @property
     def sha256(self) -> str:
         """SHA-256 of the MJCF file, or of the URDF text as UTF-8."""
-        import hashlib  # noqa: PLC0415  loads OpenSSL
+        import hashlib  # noqa: PLC0415  hashlib loads OpenSSL
 
         return self.origin.sha256 or hashlib.sha256(self.text.encode()).hexdigest()
 
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check the results of a call, and record the check.
-
-        The results have the shape in which the call returns them.
+        """Check the results of a call in the shape in which the call returns them, and record the check.
 
         Raises:
             VerificationError: the oracle's result differs by more than the bound.
@@ -261,18 +238,11 @@ class Verifier:
         frame: str,
         reference: Reference,
     ) -> Callable[..., FloatArray | None]:
-        """Return a function that calls `compute` and checks its result. The function also records the check.
+        """Return a function that computes one configuration with `compute`, and checks and records it.
 
-        The function returns None if `compute` returns None. If the oracle cannot check the robot, the
-        function always returns None.
-
-        Args:
-            name: Name of a quantity.
-            compute: Function that computes one configuration from the inputs and writes the result to `out`;
-                None if the arguments are not supported.
-            plan: The compiled tree of the frame.
-            frame: Name of the frame, as the user gave it.
-            reference: Reference frame of the results.
+        The function returns None if `compute` returns None, because its arguments are not supported. If the
+        oracle cannot check the robot, the function always returns None. `compute` writes the result to `out`,
+        its last argument. `frame` is the name that the user gave.
         """
         quantity, by, frames = QUANTITIES[name], self.library, (frame,)
         if self.cannot(None, by) is not None:
@@ -303,10 +273,7 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[Comparison, VerificationError | None]:
-        """Compare some of urdfkin's results with the oracle's results.
-
-        If a result exceeds its bound, the function also returns an error for the worst result.
-        """
+        """Compare some of urdfkin's results with the oracle's; also return an error beyond the bound."""
         x = call.part(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = comparison_with_oracle(*compared)
@@ -352,12 +319,9 @@ class Verifier:
     # -- tables --------------------------------------------------------------------------------------
 
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
-        """Check a Denavit-Hartenberg table with Pinocchio.
+        """Check a Denavit-Hartenberg table; return None, with a warning, if Pinocchio cannot check the robot.
 
         Warn if very large lengths in the table cause rounding errors above the usual bound.
-
-        Returns:
-            The result; None, with a warning, if Pinocchio cannot check the robot.
 
         Raises:
             TableError: urdfkin and Pinocchio differ by more than the bound.
@@ -371,7 +335,8 @@ class Verifier:
         check = check_table(self.oracle(), self.tree, table, drawn)
         if not check.agrees:
             raise TableError(
-                f"the {table.convention} table of {table.base_frame} to {table.tip_frame} disagrees",
+                f"the {table.convention} table of {table.base_frame} to {table.tip_frame}"
+                " disagrees with Pinocchio",
                 where=f"{self.tree.name}, Pinocchio {version()}",
                 found=str(check),
                 remedy="please report this as an error of urdfkin, with the URDF",
@@ -381,10 +346,9 @@ class Verifier:
         return check
 
     def tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Compare the placements of all links, computed from tree parameters, with Pinocchio's placements.
+        """Return a line about the agreement of all links, computed from tree parameters, with Pinocchio.
 
-        Returns:
-            A line of text about the agreement; None, with a warning, if Pinocchio cannot check the robot.
+        The result is None, with a warning, if Pinocchio cannot check the robot.
 
         Raises:
             TableError: urdfkin and Pinocchio differ by more than the bound.
@@ -423,10 +387,8 @@ def comparison_with_oracle(
 ) -> Comparison:
     """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
 
-    Large results are compared in blocks, while the oracle's results are still in the cache.
-
-    Raises:
-        OracleError: the number of the oracle's results differs from the number of configurations.
+    Large results are compared in blocks, while the oracle's results are still in the cache. OracleError is
+    raised if an oracle does not return a result for each configuration.
     """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
@@ -445,7 +407,6 @@ def comparison_with_oracle(
 
 
 def _demand_all(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) -> None:
-    """Raise an error if an oracle does not return a result for each configuration."""
     if found != wanted:
         raise OracleError(
             f"{by.title} does not return the {quantity.name} of each configuration",
@@ -457,16 +418,13 @@ def _demand_all(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) 
 def oracle_results_with_bound(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary = PINOCCHIO
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's results (n, frames, ...) for some configurations, and the bound."""
     if quantity.against is not None:
         return quantity.against(oracle, x, ours, by)
     return oracle_results(quantity, oracle, x.query), bound_of(quantity, x, by)
 
 
 def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
-    """Return the bound on the difference between urdfkin's results and the oracle's results.
-
-    NumPy can broadcast the bound to the shape of the results.
+    """Return the bound on the difference between urdfkin's results and the oracle's; it can be broadcast.
 
     If a path contains no prismatic joint, its length is the same in every configuration. Therefore, the bound
     on a placement or a Jacobian of a robot on a fixed base is computed only once, for one configuration.
@@ -500,10 +458,7 @@ def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Flo
 
 
 def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
-    """Yield an oracle's results for one block of configurations at a time.
-
-    A block may overwrite the block before it.
-    """
+    """Yield an oracle's results in blocks of configurations; the next block may overwrite a block."""
     assert quantity.blocks is not None
     return quantity.blocks(oracle, query)
 
@@ -513,11 +468,7 @@ def _warn(reason: str) -> None:
 
 
 def checked_choice(verify: object) -> Verify:
-    """Return a valid value of `verify`.
-
-    Raises:
-        InputError: the value is not True, False or "sample".
-    """
+    """Return a valid value of `verify`; raise InputError for other values."""
     if verify is True or verify is False:
         return verify
     if isinstance(verify, str) and verify == "sample":
@@ -526,16 +477,10 @@ def checked_choice(verify: object) -> Verify:
 
 
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
-    """Divide the configurations that are checked into parts. Yield the indices of each part.
+    """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
 
-    Args:
-        verify: True or "sample".
-        n: Number of configurations.
-        numbers: Number of values in the results of one configuration.
-
-    Yields:
-        Slices or arrays of indices. A sample is random with a fixed seed. Every k-th configuration could be a
-        biased sample, because batches are often ordered.
+    A sample is random with a fixed seed. Every k-th configuration could be a biased sample, because batches
+    are often ordered.
     """
     step = min(_MOST, max(1, _AT_A_TIME // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

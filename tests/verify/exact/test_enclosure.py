@@ -280,7 +280,9 @@ def test_a_robot_that_pinocchio_refuses_is_enclosed_all_the_same() -> None:
 def test_it_reads_as_what_it_says() -> None:
     lines = str(urdfkin.load(GANTRY).enclose([0.75, 0.5], [1.0, 5.0], [0.5, 0.0], "b")).splitlines()
     assert lines[0] == "b in local_world_aligned, proven with 31 digits"
-    assert lines[3] == "  acceleration: 6 numbers, widest 0.0e+00, inside 6 of urdfkin's, 6 of Pinocchio's"
+    assert lines[3] == (
+        "  acceleration: 6 intervals, at most 0.0e+00 wide; inside: 6 numbers of urdfkin, 6 of Pinocchio"
+    )
     assert len(lines) == 6
 
 

@@ -47,14 +47,9 @@ _ENDS = np.vectorize(ends, otypes=[float, float])
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosure:
-    """A lower and an upper bound of the true value of each number in a result, for example in a Jacobian.
+    """Bounds of the true value of each number in a result, in the shape of the result of the `Robot` method.
 
-    Attributes:
-        quantity: Name of the quantity.
-        lower: Lower bounds, in the shape of the result that the method of `Robot` returns.
-        upper: Upper bounds, in the same shape.
-        urdfkin: urdfkin's result.
-        pinocchio: Pinocchio's result; None if Pinocchio cannot compute it.
+    `pinocchio` is None if Pinocchio cannot compute the result.
     """
 
     quantity: str
@@ -65,32 +60,21 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference `upper - lower`. The width is 0 for each number whose true value is a double.
+        """The difference `upper - lower`: 0 for each number whose true value is a double.
 
-        For all other numbers, `upper` - `lower` is at least the distance between two neighbouring doubles.
+        For all other numbers, the width is at least the distance between two neighbouring doubles.
         """
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return a bool array, which is True for each number of `x` that lies between `lower` and `upper`.
-
-        Args:
-            x: Values, of the quantity's shape.
-
-        Raises:
-            InputError: `x` has a different shape.
-        """
+        """Return whether each number of `x` is between `lower` and `upper`; other shapes raise InputError."""
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 
     def error(self, x: ArrayLike) -> FloatArray:
         """Return an upper bound on the difference between each number of `x` and the true value.
 
-        Args:
-            x: Values, of the quantity's shape.
-
-        Raises:
-            InputError: `x` has a different shape.
+        If `x` has a different shape than the quantity, InputError is raised.
         """
         x = self._alike(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
@@ -103,10 +87,11 @@ class Enclosure:
         return x
 
     def __str__(self) -> str:
-        sides = {"urdfkin's": self.urdfkin, "Pinocchio's": self.pinocchio}
-        inside = [f"{self.contains(x).sum()} of {name}" for name, x in sides.items() if x is not None]
-        widest = self.width.max(initial=0.0)
-        return f"{self.quantity}: {self.lower.size} numbers, widest {widest:.1e}, inside {', '.join(inside)}"
+        inside = f"{self.contains(self.urdfkin).sum()} numbers of urdfkin"
+        if self.pinocchio is not None:
+            inside += f", {self.contains(self.pinocchio).sum()} of Pinocchio"
+        width = self.width.max(initial=0.0)
+        return f"{self.quantity}: {self.lower.size} intervals, at most {width:.1e} wide; inside: {inside}"
 
     def __repr__(self) -> str:
         return f"<Enclosure {self}>"
@@ -116,17 +101,8 @@ class Enclosure:
 class Enclosures:
     """Intervals that contain the true placement, velocity, acceleration and Jacobians of a frame.
 
-    Attributes:
-        frame: Name of the frame.
-        reference: Reference frame of velocity, acceleration and Jacobians.
-        digits: Number of decimal digits of the interval arithmetic. The ends of the resulting intervals are
-            rounded outward to doubles.
-        placement: (4, 4) m.
-        velocity: (6,) [linear; angular], m/s, rad/s.
-        acceleration: (6,) [linear; angular], classical, m/s^2, rad/s^2.
-        jacobian: (6, nv).
-        jacobian_rate: (6, nv).
-        hessian: (6, nv, nv); None if not requested.
+    The quantities have the shapes and units of the results of `Robot`. `digits` is the number of decimal
+    digits of the interval arithmetic. The ends of the resulting intervals are rounded outward to doubles.
     """
 
     frame: str
@@ -160,19 +136,7 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """Return intervals that contain the true results of one frame for one sample.
-
-    `Robot.enclose` explains most arguments.
-
-    Args:
-        verifier: Verifier of the robot.
-        plan_of: Function that returns the compiled tree for some links.
-        inputs: q (nq,), v (nv,) and a (nv,).
-        frame: Name of a link or joint.
-        reference: Reference frame.
-        base: Motion of the root link; None: fixed at the world origin.
-        digits: Decimal digits, or None for the default.
-        hessian: Whether to compute the intervals of the Hessian too.
+    """Return intervals that contain the true results of one frame for one sample (`Robot.enclose`).
 
     Raises:
         InputError: a batch of inputs, a wrong length, or an invalid number of digits.

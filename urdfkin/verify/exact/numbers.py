@@ -33,16 +33,17 @@ from urdfkin.verify.bounds import Conversion
 #: Number of digits in the accuracy study.
 #: A double has 16 digits, so fifty digits are enough to measure an error in its last digit.
 DIGITS = 50
-#: A double has 15 decimal digits. This constant is twice as large.
+#: Twice the 15 decimal digits of a double.
 _TWO_DOUBLES = 30
-#: A decimal digit needs `_BITS` bits. Intervals are computed with `_MORE_BITS` additional bits. Arb stores an
-#: interval as a midpoint and a radius. A midpoint of 53 bits can make the interval four times as wide as the
-#: distance between two doubles. Therefore, 55 bits are used for 15 digits, the precision of a double.
+#: A decimal digit needs `_BITS` bits, and an interval has `_MORE_BITS` additional bits.
+#: Arb stores a midpoint and a radius.
+#: With a midpoint of 53 bits, an interval can be four times as wide as the distance of two doubles.
+#: Therefore, 15 digits, the precision of a double, have 55 bits.
 _BITS, _MORE_BITS = math.log2(10.0), 5
-#: Number of significant digits of a written decimal: 17 digits determine every double. The module `decimal`
-#: computes with `_ALL_DIGITS` digits before a decimal is rounded.
+#: Number of significant digits of a written decimal: 17 digits determine every double.
+#: The module `decimal` computes with `_ALL_DIGITS` digits before a decimal is rounded.
 _SIGNIFICANT, _ALL_DIGITS = 17, 200
-#: Additional bits of precision during iterations.
+#: Additional bits of precision in iterations.
 _SPARE = 30
 
 _ONE_THREAD = lock_over_forks()
@@ -59,9 +60,7 @@ def enough_digits(joints: int) -> int:
 
 @contextmanager
 def precision(digits: int) -> Iterator[None]:
-    """Set the number of decimal digits of intervals in a `with` block.
-
-    With 15 digits, intervals have the precision of a double.
+    """Set the number of decimal digits of intervals in a `with` block; 15 digits are those of a double.
 
     Arb has one precision for the whole process. Therefore, only one thread at a time can be in such a block.
     """
@@ -70,16 +69,13 @@ def precision(digits: int) -> Iterator[None]:
 
 
 def exact(value: Number) -> Number:
-    """Return a double, an integer or a decimal in text as an interval; return an interval unchanged.
-
-    The interval of a double or an integer has width 0.
-    """
+    """Return a number or a decimal as an interval; a double or an integer becomes an interval of width 0."""
     return arb(value)
 
 
 def ends(x: Number) -> tuple[float, float]:
     """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
-    if isinstance(x, int):  # for a large robot, most numbers are zeros
+    if isinstance(x, int):  # most numbers of a large robot are zeros
         return float(x), float(x)
     return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
 
@@ -120,11 +116,7 @@ def decimal(x: Number, negligible: float) -> str | None:
 class Kind(NamedTuple):
     """Functions for one type of number, for example intervals (`BALLS`).
 
-    Attributes:
-        number: Function that converts a value to this type of number. The value is a decimal in the URDF
-            text, or the double to which a joint is locked.
-        sine_cosine: Function that returns sine and cosine of an angle.
-        root: Function that returns the square root.
+    `number` converts a decimal in the URDF text, or the double to which a joint is locked.
     """
 
     number: Callable[[str | float], Number]
@@ -132,12 +124,10 @@ class Kind(NamedTuple):
     root: Callable[[Number], Number]
 
 
-#: The functions for Arb's intervals.
 BALLS = Kind(exact, lambda angle: exact(angle).sin_cos(), lambda x: exact(x).sqrt())
 
 
 def unit(x: Vector, kind: Kind = BALLS) -> Vector:
-    """Return `x` divided by its length."""
     length = kind.root(eq.dot(x, x))
     return x[0] / length, x[1] / length, x[2] / length
 
@@ -196,7 +186,7 @@ def _defect(M: Matrix) -> Matrix:
     return x, y, z
 
 
-#: First URDF version with the attribute `quat_xyzw`; in files of older versions, the attribute is ignored.
+#: First URDF version with the attribute `quat_xyzw`; older versions ignore the attribute.
 _WITH_QUATERNIONS = (1, 1)
 
 
@@ -204,12 +194,8 @@ _WITH_QUATERNIONS = (1, 1)
 class ExactJoint:
     """The numbers of one joint in the URDF text, not rounded to doubles.
 
-    Attributes:
-        R: Orientation of the joint frame relative to its parent.
-        p: Position of the joint frame relative to its parent, m.
-        axis: Unit axis in the joint frame.
-        multiplier: Multiplier of a mimic joint, else 1.
-        offset: Offset of a mimic joint, else 0.
+    R and p (m) are the pose of the joint frame in its parent link. A joint without a mimic rule has the
+    multiplier 1 and the offset 0.
     """
 
     R: Matrix
@@ -222,16 +208,10 @@ class ExactJoint:
 def read_exact(
     text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: Kind = BALLS
 ) -> dict[int, ExactJoint]:
-    """Read the exact numbers of joints from the URDF text; return them by the joints' index in the tree.
+    """Read the exact numbers of the joints `among` (None: all), by the joints' index in the tree.
 
-    Args:
-        text: The URDF text.
-        tree: The tree of the same text. If the tree has a `root_joint`, this joint is not in the text.
-        among: Indices of the joints whose numbers are read; None: all joints.
-        kind: Functions for the type of the numbers.
-
-    Raises:
-        InputError: a joint of the tree is not in the text.
+    A `root_joint` of the tree is not in the text. InputError is raised if another joint of the tree is not in
+    the text.
     """
     words = _Text(text, kind)
     return {
@@ -243,19 +223,13 @@ def read_exact(
 def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> Conversion:
     """Return the errors that converting a URDF's decimals to doubles causes (`against_true_values`).
 
-    Args:
-        text: The URDF text.
-        tree: The tree of the same text.
-        path: Indices of the joints of a frame's path, from the root.
-        q: (n, nq) configurations.
+    `path` contains the indices of the joints of a frame's path, from the root. q has the shape (n, nq).
     """
     return _Text(text).conversion(tree, path, q)
 
 
 @lru_cache(maxsize=1)  # parsing a large URDF takes longer than computing the intervals of one sample
 class _Text:
-    """Reader of the joints of a URDF text."""
-
     def __init__(self, text: str, kind: Kind = BALLS) -> None:
         self.kind = kind
         root = plain_xml(text)
@@ -348,10 +322,7 @@ class _Text:
         return Conversion(angles, rules, np.array(lengths))
 
     def value(self, name: str, at: Mapping[str, Any]) -> _Value:
-        """Return bounds on a joint's coordinate and on the rounding error of this coordinate.
-
-        `at` contains the values of the independent joints.
-        """
+        """Return bounds on a joint's value and its rounding error, for values `at` of independent joints."""
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
             return _Value(abs(at[name]), 0.0, 0.0, 0)
@@ -368,7 +339,6 @@ class _Value(NamedTuple):
         moved: |M q|.
         offset: Sum of the absolute values of the terms of C. C has one term for each mimic rule.
         error: Rounding error of the value, in eps, if a program applies the rules one after the other.
-        rules: Number of rules.
     """
 
     moved: Any

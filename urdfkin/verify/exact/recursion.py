@@ -39,11 +39,9 @@ _FREE_AXES = {
 
 
 def on_base(base: BaseNumbers) -> State:
-    """Convert the base's motion to the state of the root link in the recursion.
+    """Convert the motion of one base to the state of the root link in the recursion.
 
-    Args:
-        base: Placement (4, 4), velocity (6,) and acceleration (6,) of the base. The rotation matrix of the
-            placement is correct to nine digits. The nearest exact rotation replaces it.
+    The nearest exact rotation replaces the rotation matrix, which is correct to nine digits.
     """
 
     def vector(x: FloatArray) -> Vector:
@@ -56,13 +54,7 @@ def on_base(base: BaseNumbers) -> State:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """The motion of all links of the robot in one sample.
-
-    Attributes:
-        states: Position, velocity and acceleration of each link, by the link's index.
-        columns: Columns of each link's Jacobian, by the link's index.
-        nv: Length of v.
-    """
+    """Position, velocity and acceleration, and Jacobian columns of each link in one sample, by link index."""
 
     states: Mapping[int, State]
     columns: Mapping[int, tuple[Column, ...]]
@@ -78,16 +70,9 @@ def move(
     *,
     base: State | None = None,
 ) -> Motion:
-    """Return the position, velocity and acceleration of each link in one sample.
+    """Return the motion of the links of `joints` in one sample; without `base`, the root link is fixed.
 
-    Args:
-        tree: The robot.
-        joints: The joints as `read_exact` returns them, by joint index. A joint comes after all joints on its
-            path to the root.
-        q: (nq,) coordinates, as doubles or intervals.
-        v: (nv,) joint velocities.
-        a: (nv,) joint accelerations.
-        base: State of the root link; None: fixed at the world origin.
+    `joints` is a result of `read_exact`. A joint comes after all joints on its path to the root.
     """
     q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
     states = {0: base or State()}
@@ -176,7 +161,7 @@ def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[n
     """Return the Hessian (6, nv, nv) of a link."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        # the product of an interval and an array is not defined
+        # The product of an interval and an array is not defined.
         out[of, by] += _array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
