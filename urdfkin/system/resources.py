@@ -13,10 +13,7 @@ from urdfkin.errors import SourceError
 
 @cache
 def robots_dir() -> Path:
-    """Return the folder `robots`.
-
-    The folder is inside the installed package; in a checkout, the folder is beside the package.
-    """
+    """Return the folder `robots`, which is in the installed package or, in a checkout, beside the package."""
     here = Path(__file__).resolve().parents[1]
     for folder in (here / "robots", here.parent / "robots"):
         if (folder / "catalogue.toml").is_file():
@@ -25,10 +22,7 @@ def robots_dir() -> Path:
 
 
 def questions_page() -> Path:
-    """Return the path of questions.md.
-
-    The file is inside the installed package; in a checkout, the file is in `docs`.
-    """
+    """Return the path of questions.md, which is in the installed package or, in a checkout, in `docs`."""
     here = Path(__file__).resolve().parents[1]
     for file in (here / "questions.md", here.parent / "docs" / "questions.md"):
         if file.is_file():
@@ -40,11 +34,7 @@ def questions_page() -> Path:
 
 @cache
 def example_robots_dir() -> Path:
-    """Return the folder `share/example-robot-data/robots`, without importing that package.
-
-    Raises:
-        SourceError: example-robot-data is not installed.
-    """
+    """Return the folder `share/example-robot-data/robots` without importing that package."""
     candidates = list(_example_candidates())
     for folder in candidates:
         if folder.is_dir():
@@ -58,7 +48,7 @@ def example_robots_dir() -> Path:
 
 def _example_candidates() -> Iterator[Path]:
     below = Path("share", "example-robot-data", "robots")
-    from importlib import metadata  # noqa: PLC0415  this import is as slow as loading a robot
+    from importlib import metadata  # noqa: PLC0415  this import takes as long as loading a robot
 
     try:
         distribution = metadata.distribution("example-robot-data")
