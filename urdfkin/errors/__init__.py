@@ -245,8 +245,8 @@ class SourceError(UrdfkinError, OSError):
 class RepresentationSingularityError(InputError):
     """Euler angles are at their representational singularity, where their derivatives do not exist (7.56).
 
-    The motion itself is regular. `distance` is the difference in radians between the middle angle and its value
-    at the singularity. `sample` is the index of the worst sample of a batch, () for a single sample.
+    The motion itself is regular. `distance` is the difference in radians between the middle angle and its
+    value at the singularity. `sample` is the index of the worst sample of a batch, () for a single sample.
     """
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:

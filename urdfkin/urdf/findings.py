@@ -1,9 +1,8 @@
-"""Define findings. A finding is a problem in a URDF, with a code, a position, the found text and a remedy.
+"""Define findings: problems in a URDF, each with a code, a position, the found text and a remedy.
 
-The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. The reporter
-computes the position of each finding in the bytes of the file, and applies the comments that silence
-findings. A finding is plain data: it can be printed, compared, converted to JSON or SARIF and sent to another
-process. A byte order mark has no effect on positions.
+The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. A finding is plain
+data: it can be printed, compared, converted to JSON or SARIF and sent to another process. A byte order mark
+has no effect on positions.
 
 A comment in a URDF names the codes that it silences, and gives a reason.
 
@@ -48,28 +47,21 @@ def quoted(text: str, limit: int = QUOTED) -> str:
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: An excerpt of a long line has `SHOWN` characters. At most `BEFORE` of these characters precede the marked
-#: text.
+#: An excerpt of a long line has `SHOWN` characters; at most `BEFORE` of them precede the marked text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
 
 
 class Excerpts:
-    """Excerpts of one file: the line of a finding, with carets below the marked text.
-
-    Args:
-        data: The bytes of the file without a byte order mark.
-    """
+    """Excerpts of a file without a byte order mark: lines of findings, with carets below the marked text."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
         self.number, self.text = 0, ""
 
     def of(self, finding: Finding) -> str | None:
-        """Return two lines: the line of the file, and a line with carets below it.
-
-        Return None for a finding about the whole file.
+        """Return a line of the file and a line with carets; None for a finding about the whole file.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -79,7 +71,7 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # decode each line only once, because a line may be megabytes long
+        if self.number != finding.line:  # a line may be megabytes long, so it is decoded once
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
@@ -225,7 +217,7 @@ class Finding:
             return ""
         tag = shortened(self.element)
         if self.element == "prim" and self.name is not None and len(self.name) > QUOTED:
-            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"  # the end of a path names the prim
+            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"  # a path ends with the prim's name
         return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
 
     @property
@@ -315,7 +307,7 @@ class UrdfError(UrdfkinError, ValueError):
     URDF402
     """
 
-    #: Number of errors that the message lists. The message only counts further errors.
+    #: Number of errors that the message lists; it counts the others.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -359,8 +351,6 @@ class Rule:
         id: The code: `URDF` and three digits. A code is never reused. The first digit shows the topic of the
             rule. 1: text and XML. 2: elements and attributes. 3: numbers. 4: names and structure. 5: joints.
             6: probable mistakes. 7: inertials, geometry and materials.
-        slug: The short name.
-        severity: The default severity of its findings.
         oracle: Pinocchio's behaviour, if it differs from the specification.
     """
 
@@ -370,7 +360,7 @@ class Rule:
     oracle: PinocchioReading | None = None
 
 
-#: A comment that begins with this word contains an instruction for urdfkin. Spaces may precede the word.
+#: The first word, after any spaces, of a comment with an instruction for urdfkin.
 MARK = "urdfkin:"
 
 
@@ -380,8 +370,6 @@ class Comment:
 
     Attributes:
         text: The text between `<!--` and `-->`.
-        line: The line, from 1.
-        column: The column, from 1.
         behind: Whether the line has other text before the comment.
         element: The next element, or None.
     """
@@ -395,14 +383,7 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """The codes that a comment silences.
-
-    Attributes:
-        comment: The comment.
-        codes: The codes.
-        reason: The reason.
-        used: The codes in this comment that have silenced at least one finding.
-    """
+    """The codes that a comment silences; `used` are the codes that have silenced at least one finding."""
 
     comment: Comment
     codes: tuple[str, ...]
@@ -410,7 +391,7 @@ class Silence:
     used: set[str] = field(default_factory=set)
 
 
-#: For each code: the first comment that silences it.
+#: The first comment that silences a code, by code.
 Codes = dict[str, Silence]
 
 
@@ -422,7 +403,6 @@ class Silences:
         everywhere: Comments for the whole file.
         lines: Comments for a line, by line number.
         elements: Comments for an element, by the element's `id()`.
-        all: All comments.
     """
 
     everywhere: Codes = field(default_factory=dict)
@@ -434,7 +414,6 @@ class Silences:
         return bool(self.all)
 
     def add(self, silence: Silence) -> None:
-        """Add a comment."""
         self.all.append(silence)
         place = self._place(silence.comment)
         for code in silence.codes:
@@ -450,13 +429,7 @@ class Silences:
         return self.elements.setdefault(id(comment.element), {})
 
     def reason(self, code: str, line: int, at: Element | None) -> str | None:
-        """Return the reason of the nearest comment that silences a finding; None if there is none.
-
-        Args:
-            code: The code of the finding.
-            line: The line of the finding.
-            at: The element of the finding.
-        """
+        """Return the reason of the nearest comment that silences a finding; None if there is none."""
         silence = self.lines.get(line, {}).get(code)
         while silence is None and at is not None:
             silence = self.elements.get(id(at), {}).get(code)
@@ -468,22 +441,18 @@ class Silences:
         return silence.reason
 
 
-#: The search for the correct spelling of a misspelt name is slow. In one file, urdfkin searches for at most
-#: `SEARCHES` names, and compares each with at most `CANDIDATES` known names. `WORK` is the argument `work` of
-#: `nearest`.
+#: `SEARCHES`: number of misspelt names in a file for which urdfkin searches the correct spelling.
+#: `CANDIDATES`: number of known names in each search. `WORK`: the argument `work` of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
-#: If a file has at least `FOLDED` warnings with one code, urdfkin combines them into one finding. The same
-#: applies to notes. For the codes URDF7xx (content that kinematics does not use), `FOLDED_EXTRAS` findings
-#: are enough.
+#: `FOLDED` or more warnings (or notes) with one code become one finding.
+#: `FOLDED_EXTRAS` replaces `FOLDED` for URDF7xx: content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: urdfkin reports at most this number of errors with one code separately. For further errors it only lists
-#: the line numbers.
+#: Number of errors with one code that are reported separately; the last one lists the lines of the others.
 ERRORS_SHOWN = 100
 
-#: urdfkin stores at most this number of findings with one code completely. For further findings it only
-#: stores the line number.
+#: Number of stored findings with one code. Of each further finding, only the line number is stored.
 WRITTEN_OUT = 10_000
 
 
@@ -491,11 +460,8 @@ WRITTEN_OUT = 10_000
 class _Kind:
     """The findings of one code and severity.
 
-    Attributes:
-        severity: The severity.
-        found: Pairs of a finding and its weight (see the argument `weight` of `Reporter.add`). There are at
-            most `WRITTEN_OUT` pairs.
-        lines: The line numbers of all findings that are not in `found`.
+    `found` has at most `WRITTEN_OUT` findings, each with its weight (see `Reporter.add`). `lines` are the
+    line numbers of the others.
     """
 
     severity: Severity
@@ -510,9 +476,8 @@ class Reporter:
     Attributes:
         file: The name of the file, for the findings.
         data: The bytes of the file, for the positions of attributes.
-        limits: Limits on the size of the file and its parts.
         comments: The comments for urdfkin.
-        silenced: Pairs of a finding that a comment silences, and the reason in this comment.
+        silenced: The findings that a comment silences, each with the reason in this comment.
         silences: The parsed comments.
     """
 
@@ -549,8 +514,7 @@ class Reporter:
             rule: The rule.
             message: The problem in one clause.
             at: The element with the problem. If it is None, the finding is at `position`.
-            attribute: Name of an attribute of the element `at`. The printed excerpt of the file underlines
-                this attribute.
+            attribute: Name of the attribute of `at` that the printed excerpt of the file underlines.
             found: The wrong text in the file, in quotes.
             remedy: The remedy.
             owner: The tag that the finding names. None: the tag of the link or joint that contains `at`. Set
@@ -610,11 +574,7 @@ class Reporter:
                 kind.found = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three known names similar to `word`.
-
-        This search is slow. Therefore, only the first `SEARCHES` calls search. Later calls return an empty
-        list.
-        """
+        """Return up to three similar names; [] after `SEARCHES` calls, because the search is slow."""
         self._searches += 1
         if self._searches > SEARCHES:
             return []
@@ -627,7 +587,6 @@ class Reporter:
 
     @property
     def failed(self) -> bool:
-        """Whether there is an error."""
         return any(severity is Severity.ERROR for _, severity in self._kinds)
 
     def findings(
@@ -635,12 +594,9 @@ class Reporter:
     ) -> tuple[Finding, ...]:
         """Return the findings by line.
 
-        Args:
-            fold: Whether to combine many warnings with one code into one finding. If `fold` is True and there
-                are more than a hundred errors with one code, the hundredth error lists the lines of the
-                others.
-            wanted: A function that returns whether to report a finding. It is called once for each finding,
-                in file order. None: all findings are reported.
+        `fold` combines many warnings with one code into one finding; of more than a hundred errors with one
+        code, the hundredth lists the lines of the others. `wanted` is called once for each finding, in file
+        order, and returns whether to report it.
         """
         kinds = [kind for kind in self._kinds.values() if kind.found]
         if wanted is not None:
@@ -658,19 +614,13 @@ class Reporter:
 
     @property
     def has_raw_blanks(self) -> bool:
-        """Whether an attribute value contains a tab, a line end, or a reference such as `&amp;`.
-
-        An XML parser replaces these characters.
-        """
+        """Whether an attribute value contains characters that an XML parser replaces (see `_RAW_BLANK`)."""
         if self._raw_blanks is None:
             self._raw_blanks = _RAW_BLANK.search(self.data) is not None
         return self._raw_blanks
 
     def raw(self, at: Element, attribute: str) -> str | None:
-        """Return the value of an attribute as written in the file.
-
-        An XML parser replaces tabs, line ends and references such as `&amp;`; here they are unchanged.
-        """
+        """Return the value of an attribute as written, before an XML parser replaces its characters."""
         span = self._spans(at).get(attribute)
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
@@ -689,7 +639,6 @@ class Reporter:
         return span.line, span.column, len(first.decode("utf-8", "replace"))
 
     def rewritten(self, at: Element, attribute: str, value: str, turns: float = 0.0) -> Fix | None:
-        """Return the fix that changes the value of an attribute."""
         span = self._spans(at).get(attribute)
         return None if span is None else Fix((Edit(*span.value, value),), turns)
 
@@ -702,10 +651,7 @@ class Reporter:
         )
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element.
-
-        If the line contains only this element, the whole line is removed.
-        """
+        """Return the fix that removes an empty element, and its line if nothing else is on it."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
@@ -771,10 +717,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings with one code and severity.
-
-    If there are many, combine them into one finding that lists all lines.
-    """
+    """Return the findings with one code and severity; many become one finding that lists all lines."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

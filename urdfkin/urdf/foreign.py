@@ -38,26 +38,22 @@ class XmlElement(Protocol):
     """An element of Python's ElementTree or of lxml's."""
 
     @property
-    def tag(self) -> Any:
-        """The name of the element."""
+    def tag(self) -> Any: ...
 
     @property
-    def attrib(self) -> Any:
-        """The names and values of the attributes."""
+    def attrib(self) -> Any: ...
 
 
 class XmlTree(Protocol):
     """A tree of `XmlElement`."""
 
-    def getroot(self) -> Any:
-        """Return the root element."""
+    def getroot(self) -> Any: ...
 
 
 def text_of(source: Any) -> tuple[str, str] | None:
     """Return the URDF text of an object and its name in messages; None for any other source.
 
-    Raises:
-        InputError: an element cannot be written as XML, or a yourdfpy robot is not a tree.
+    Raise InputError if an element cannot be written as XML, or a yourdfpy robot is not a tree.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return urdf_of(getattr(source, "robot", source)), "<yourdfpy>"
@@ -71,11 +67,7 @@ def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
     """Return a finding for a yourdfpy robot whose rotations may be lost; none for any other source.
 
     yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text of the file. If a joint in
-    the file has quat_xyzw, yourdfpy loses the rotation of this joint.
-
-    Args:
-        source: The object.
-        file: The name of the robot in messages.
+    the file has quat_xyzw, yourdfpy loses the rotation of this joint. `file` is the robot's name in messages.
     """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -120,7 +112,6 @@ def urdf_of(robot: yourdf.Robot) -> str:
 
 
 def _record(joint: yourdf.Joint) -> JointRecord:
-    """Convert a joint of yourdfpy to a record."""
     T = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64)
     axis = (1.0, 0.0, 0.0) if joint.axis is None else tuple(map(float, joint.axis))
     limit, rule = joint.limit, joint.mimic
@@ -134,7 +125,7 @@ def _record(joint: yourdf.Joint) -> JointRecord:
 
 
 def _text(root: Any) -> str:
-    """Write elements, attributes and text. Comments are skipped; their tag is not a string."""
+    """Write elements, attributes and text without comments, whose tag is not a string."""
     if not isinstance(root.tag, str):
         raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
     try:
@@ -152,9 +143,8 @@ def _text(root: Any) -> str:
 
 
 _ROOT = "universe"
-#: Pattern for the class names of joints whose axis is the x, y or z axis of the joint frame.
+#: Class names of joints whose axis is the x, y or z axis of the joint frame.
 #: R is a revolute joint, RUB a revolute joint without limits, and P a prismatic joint.
-#: `_KINDS` contains the class names of all other joints.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
@@ -166,8 +156,7 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: If a joint has no limit, Pinocchio stores the largest double. urdfkin therefore treats each limit above
-#: this number as missing.
+#: Limits above this number are missing limits: Pinocchio stores the largest double for them.
 _ENDLESS = 1e300
 
 
@@ -176,10 +165,8 @@ class Modelled:
     """The tree of a model.
 
     Attributes:
-        tree: The kinematic tree.
-        joints: For each link whose frame is the frame of a Pinocchio joint: the index of this joint in the
-            model.
-        frames: For each other link: the index of its frame in the model.
+        joints: The index of a Pinocchio joint, by each link whose frame is the frame of this joint.
+        frames: The index of a Pinocchio frame, by each other link.
     """
 
     tree: KinematicTree
@@ -188,27 +175,18 @@ class Modelled:
 
 
 def is_model(source: object) -> TypeGuard[Any]:
-    """Return whether an object is Pinocchio's `Model` or `RobotWrapper`.
-
-    The function compares class names, so that it does not import Pinocchio.
-    """
+    """Return whether an object is Pinocchio's `Model` or `RobotWrapper`, without importing Pinocchio."""
     kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(source).__mro__]
     return ("pinocchio", "Model") in kinds or ("pinocchio", "RobotWrapper") in kinds
 
 
 def tree_of_model(source: Any) -> Modelled:
-    """Convert Pinocchio's `Model` or `RobotWrapper` to a kinematic tree.
-
-    Raises:
-        InputError: the model has a joint of a type that URDF does not have.
-    """
+    """Convert Pinocchio's `Model` or `RobotWrapper`; raise InputError for a joint that URDF does not have."""
     model = getattr(source, "model", source)
     return _ModelReader(model).read()
 
 
 class _ModelReader:
-    """Convert one model to a kinematic tree. The attributes store intermediate results."""
-
     def __init__(self, model: Any) -> None:
         self.model = model
         self.frames = list(model.frames)
@@ -240,10 +218,7 @@ class _ModelReader:
         return name
 
     def read(self) -> Modelled:
-        """Convert all frames, then all moving joints.
-
-        In a Pinocchio model, parent frames precede child frames.
-        """
+        """Convert all frames, then all moving joints. In a model, parent frames precede child frames."""
         for i in range(len(self.frames)):
             self._frame(i)
         own = {
@@ -260,10 +235,7 @@ class _ModelReader:
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return the parent link of a frame, and the frame's pose in this link.
-
-        T is the frame's pose in the frame of its parent joint.
-        """
+        """Return a frame's parent link and its pose in this link. T is its pose in the joint frame."""
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T

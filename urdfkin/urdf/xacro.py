@@ -1,13 +1,11 @@
 """Expand a .xacro file to URDF text, in a separate process with restricted rights.
 
 A xacro file is a program, and may come from an untrusted source. `expanding` is the code of the separate
-process. docs/xacro.md lists the operations that a file may do. `urdfkin.urdf.catalogue` finds packages
-without ROS.
+process. docs/xacro.md lists the operations that a file may do.
 
 xacro ignores an argument that the file does not declare; urdfkin raises an error. To find the declared
-arguments, the separate process reads the file and its includes. An include cannot be read if its name is
-computed, if the file is not found, or if the file is not allowed. If an include cannot be read, urdfkin does
-not know all declared arguments, so it accepts any argument of the user.
+arguments, the separate process reads the file and its includes. If the name of an include is computed, or if
+the include is not found or not allowed, urdfkin accepts any argument of the user.
 """
 
 from __future__ import annotations
@@ -31,10 +29,10 @@ from urdfkin.urdf.catalogue import VARIABLES
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError
 
-#: Limits of the search for declared arguments: the size of one file in bytes, and the number of files.
+#: Largest size of one file in bytes, and largest number of files, in the search for declared arguments.
 MOST_ARGUMENTS, MOST_FILES = 10_000_000, 200
 
-#: A function that returns the folder of a package, or raises LookupError.
+#: Returns the folder of a package, or raises LookupError.
 Find = Callable[[str], str]
 
 _USED = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
@@ -43,29 +41,15 @@ _COMPUTED = re.compile(r"\$[({]|[*?\[]")
 
 
 def check_arguments(path: Path, given: Iterable[str], known: Collection[str] | None) -> None:
-    """Refuse arguments that a xacro file neither declares nor uses.
-
-    Args:
-        path: The file.
-        given: Names of the arguments that the user passed.
-        known: The names that `arguments_of` returned. None: every argument is accepted.
-
-    Raises:
-        UnknownNameError: an argument is not among the known names, which the message lists.
-    """
+    """Raise UnknownNameError for an argument that is not among the known names (None: all are known)."""
     if known is not None and (unknown := [name for name in given if name not in known]):
         raise UnknownNameError("xacro argument", unknown[0], known, where=str(path))
 
 
 def arguments_of(path: Path, find: Find) -> set[str] | None:
-    """Return the names in `<xacro:arg>` and `$(arg)` of a file and its includes.
+    """Return the names in `<xacro:arg>` and `$(arg)` of a file and its includes, or None.
 
-    Args:
-        path: The file.
-        find: A function that returns the folder of a package.
-
-    Returns:
-        The names, or None if an include cannot be read.
+    The result is None if an include cannot be read.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     while files:
@@ -110,7 +94,7 @@ def _included_file(name: str, beside: Path, find: Find) -> Path | None:
     return None if _COMPUTED.search(name) or not name else folder / name
 
 
-#: Time limit of an expansion in seconds. This limit is needed because a macro may call itself without end.
+#: Time limit of an expansion in seconds, because a macro may call itself without end.
 PATIENCE = 60.0
 
 #: Size limit of the answer in bytes.
@@ -124,16 +108,12 @@ class XacroError(UrdfkinError):
 def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIENCE) -> bytes:
     """Return the URDF of a xacro file, as UTF-8.
 
-    Args:
-        path: The file.
-        arguments: Values for the arguments that the file declares by `<xacro:arg>`.
-        patience: Time limit in seconds.
-
     Raises:
         SourceError: the file does not exist.
         UnknownNameError: the file does not declare an argument.
         XacroError: xacrodoc is not installed, or xacro cannot expand the file. For example, the xacro code
-            opens a forbidden file, starts a program, or needs too much memory or time.
+            opens a forbidden file, starts a program, or needs too much memory or more than `patience`
+            seconds.
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))
@@ -181,7 +161,6 @@ def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes
 
 
 def _absolute(entries: str) -> str:
-    """Make the entries of a search path absolute."""
     return os.pathsep.join(str(Path(entry).absolute()) for entry in entries.split(os.pathsep) if entry)
 
 
