@@ -24,13 +24,8 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
     """Return one SARIF run with every code as a rule and every finding as a result.
 
-    The run contains a rule about MJCF or USD files only if a finding has the code of this rule.
-
-    Args:
-        findings: The reported findings.
-        version: The version of urdfkin.
-        silenced: Pairs of a finding that a comment silences, and the reason in this comment. In SARIF, these
-            findings are marked as "suppressed in source".
+    The run contains a rule about MJCF or USD files only if a finding has its code. Each silenced finding has
+    the reason of its comment, and is marked as "suppressed in source".
     """
     codes = {finding.code for finding in findings}
     rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
@@ -110,9 +105,7 @@ def _region(finding: Finding) -> dict[str, int]:
 
 
 def _uri(file: str) -> str:
-    """Return a file name as a URI reference; `stdin` for standard input.
-
-    A relative file name becomes a relative reference.
+    """Return a file name as a URI reference, relative for a relative name; `stdin` for standard input.
 
     Bytes that a URI does not allow are written as %XX.
     """
