@@ -11,8 +11,8 @@
 - Joints that close a loop, point to nothing or are excluded from the articulation are findings.
 
 A stage may consist of many files, its layers. Before OpenUSD composes the layers, `files_of` reads each layer
-alone. It refuses a layer with a reference to a network address, or to a file outside the robot's folder,
-package and repository.
+separately, and refuses references to network addresses and to files outside the robot's folder, package and
+repository.
 """
 
 from __future__ import annotations
@@ -55,38 +55,37 @@ from urdfkin.urdf.sources import USD
 _LAYERS = 1_000
 #: Largest number in single precision. A USD file contains this number or infinity if a joint has no limit.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Rounding can make the axes of a frame appear not perpendicular. If the cosine between two axes is at most
-#: `_SHEAR` * u * n, the frame has no shear. Here, n is the number of prims on the path to the prim of the
-#: frame, and u is the largest relative error of rounding to single precision. If a file stores a rotation
-#: matrix, each entry has an error of u. The multiplication of two such matrices in single precision adds an
-#: error of 3 u to each entry. Therefore the scalar product of two columns has an error of at most 4 * 2
-#: sqrt(3) u, which is below 14 u. If a file stores a quaternion, rounding changes the length of the
-#: quaternion by u, and the cosine between two axes by 4 u.
+#: Largest cosine between two axes of a frame without shear, as a multiple of u n.
+#: n is the number of prims on the path to the frame's prim.
+#: u is the largest relative error of rounding to single precision.
+#: Each entry of a stored rotation matrix has an error of u.
+#: The product of two rotation matrices in single precision adds an error of 3 u to each entry.
+#: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
+#: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: Limits of a joint up to this number hold it at one value, whether they are degrees or radians.
+#: Largest limit of a joint that hardly moves, whether the limit is in degrees or radians.
 _SMALLEST_ANGLE = 0.01
 _NONE = (-math.inf, math.inf)
 #: First bytes of a file that Git LFS has not fetched.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: A relationship to the mimicked joint; the group is the direction that the name of PhysX's schema contains.
+#: Relationships to the mimicked joint. The group is the direction in the name of PhysX's schema.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
-#: If the name of a type or of an applied schema contains one of these words, it couples joints or bodies.
+#: Words in the names of types and applied schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Endings of the type names of joints that a tree cannot represent.
-#: OpenUSD recognizes such a type as a joint only if the plugin that defines it is installed.
+#: OpenUSD recognizes such a joint only if the plugin that defines the type is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Coefficients of the quadratic and higher terms of a MuJoCo joint equality. A mimic rule is linear, so it
-#: cannot contain these terms.
+#: Coefficients of a MuJoCo joint equality that a mimic rule, which is linear, cannot contain.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
-#: Names of Xforms that hold the shapes of a body.
+#: Names of Xforms that contain the shapes of a body.
 _SHAPES = ("visual", "visuals", "collision", "collisions")
 #: Rotation matrix that turns the up axis y to z.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: The kinds of remarks; `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
+#: The kinds of remarks. `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -98,10 +97,8 @@ class Remark:
     """A part of the stage that the tree does not represent, or that is probably a mistake.
 
     Attributes:
-        kind: The kind.
         where: The path of the prim; empty if the remark is about the whole stage.
         what: A description in one clause.
-        remedy: The remedy, or None.
     """
 
     kind: Kind
@@ -116,15 +113,12 @@ class JointReading:
 
     Attributes:
         free: The free directions, such as `rotZ`.
-        body0: Path of the first body; empty for the world.
-        body1: Path of the second body; empty for the world.
-        p0: (3,) origin of the joint's frame in the first body, m.
-        quat0: (4,) unit quaternion of the joint's frame in the first body, scalar last.
-        p1: (3,) origin of the joint's frame in the second body, m.
-        quat1: (4,) unit quaternion of the joint's frame in the second body, scalar last.
+        body0: Path of the first body; empty for the world. `body1` is the path of the second body.
+        p0: (3,) origin of the joint's frame in the first body, m. `p1` is the origin in the second body.
+        quat0: (4,) unit quaternion of the joint's frame in the first body, scalar last. `quat1` is that in
+            the second body.
         limits: Lower and upper limit, rad or m.
-        size: `p0` and `p1` are sums of vectors. `size` is the sum of the lengths (m) of these vectors, for
-            error bounds.
+        size: Sum of the lengths (m) of the vectors whose sums are `p0` and `p1`, for error bounds.
     """
 
     free: str
@@ -138,7 +132,6 @@ class JointReading:
     size: float
 
     def as_list(self) -> list[Any]:
-        """Return plain data for JSON."""
         return [one.tolist() if isinstance(one, np.ndarray) else one for one in astuple(self)]
 
 
@@ -147,18 +140,15 @@ class Usd:
     """A robot from a USD stage.
 
     Attributes:
-        tree: The links and joints.
-        prims: For each link that represents a prim: the path of the prim.
-        rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up. UsdGeom computes these
-            poses.
+        prims: The path of the prim of each link that represents a prim.
+        rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
         rest_q: (nq,) configuration of the robot in the stage.
-        single: For each joint name: five numbers that describe the effect of rounding to single precision.
+        single: Five numbers for each joint name that describe the effect of rounding to single precision.
             Number 1: a bound (m) on the error of the joint origins. Number 2: a bound (rad) on the error of
             the joint orientations. Number 3: the sum of the lengths (m) of the vectors that these orientation
             errors rotate. Number 4: a bound on the relative error of the joint value if a mimic rule computes
             it, otherwise 0. Number 5: the distance (m) between the joint frame and the frame of the child.
-        joints: The numbers of each joint prim of the tree. The key is the path of the prim.
-        stage: The stage.
+        joints: The numbers of each joint prim of the tree, by the path of the prim.
         unit: metersPerUnit.
         remarks: Parts of the stage that the tree does not represent, and probable mistakes.
         files: The files of the stage.
@@ -185,13 +175,9 @@ def version() -> str:
 
 
 def library() -> Any:
-    """Return the modules of OpenUSD, as the attributes of one object.
-
-    Raises:
-        InputError: OpenUSD is not installed.
-    """
+    """Return the modules of OpenUSD as attributes of one object; raise InputError without OpenUSD."""
     try:
-        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  an extra, and heavy
+        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  the import of this optional package is slow
     except ImportError:
         raise InputError("OpenUSD is not installed", remedy=install_remedy("usd")) from None
     return type(
@@ -202,12 +188,11 @@ def library() -> Any:
 
 
 def files_of(pxr: Any, path: str) -> tuple[str, ...]:
-    """Return the files of a stage. Each layer is read alone, before its references are followed.
+    """Return the files of a stage. Each layer is read separately, before its references are followed.
 
     Raises:
-        InputError: there are too many layers, or a layer has a reference that is not allowed. These are
-            network addresses, expressions, files that are not USD, and files outside the robot's folder,
-            package and repository.
+        InputError: there are too many layers, or a layer has a reference to a network address, an expression,
+            a file that is not USD, or a file outside the robot's folder, package and repository.
         SourceError: a file is too large, or not a regular file.
     """
     ground = Ground.around(Path(path), [], [])
@@ -243,7 +228,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Refuse value clips. USD does not list the files of value clips as dependencies of a layer."""
+    """Refuse value clips, because USD does not list their files as dependencies of a layer."""
     found: list[str] = []
 
     def look(path: Any) -> None:
@@ -268,18 +253,18 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
         raise _refused("a reference is an address, and urdfkin fetches nothing", where, written)
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
-    if not os.path.isabs(outer):  # noqa: PTH117  OpenUSD finds no such file beside the layer
-        # OpenUSD would look in the current folder too
-        here = os.path.abspath(outer)  # noqa: PTH100  `Ground.holds` resolves links
+    if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
+        # OpenUSD finds no such file beside the layer, and would look in the current folder.
+        here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
-        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  not every name is a path
+        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  a name may be no path
     if not ground.holds(outer):
         raise _refused(
             "a reference leads outside the folder, package and repository of the stage", where, written
         )
     if Path(inner or outer).suffix.lower() not in USD:
         raise _refused("a reference names a file that is not USD", where, written)
-    return address if os.path.exists(outer) else None  # noqa: PTH110  not every name is a path
+    return address if os.path.exists(outer) else None  # noqa: PTH110  a name may be no path
 
 
 def _refused(what: str, where: str, found: str) -> InputError:
@@ -293,7 +278,7 @@ def _refused(what: str, where: str, found: str) -> InputError:
 
 def _size(path: str, where: str) -> int:
     try:
-        found = os.stat(path)  # noqa: PTH116  not every name is a path
+        found = os.stat(path)  # noqa: PTH116  a name may be no path
     except OSError as error:
         raise SourceError("the file cannot be read", where=path, found=error.strerror) from None
     if not stat.S_ISREG(found.st_mode):
@@ -339,14 +324,11 @@ def read_usd(
 
 
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
-    """Select variants in the session layer, so that no file changes.
+    """Select variants in the session layer, so that no file changes; return the paths of expanded instances.
 
     OpenUSD cannot select a variant inside an instance. If an instance contains the variant set, this function
-    therefore makes the prim non-instanceable, also in the session layer. This operation expands the instance.
-    Return the paths of the expanded instances.
-
-    Raises:
-        UnknownNameError: no prim has such a variant set, or such a variant.
+    therefore makes the prim non-instanceable, also in the session layer, which expands the instance. Raise
+    UnknownNameError if no prim has such a variant set, or such a variant.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     opened = set[str]()
@@ -394,8 +376,8 @@ class _Body:
 class _Edge:
     """A joint prim.
 
-    `ends` contains the paths of the two bodies that the joint connects; None is the world. `frames` contains
-    two poses of the joint frame: its pose in the first body, and its pose in the second body.
+    `ends` are the paths of the two bodies that the joint connects; None is the world. `frames` are the poses
+    of the joint frame in these bodies.
     """
 
     prim: Any
@@ -419,10 +401,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _Reader:
-    """Reader of one stage.
-
-    `source` is the stage's name in messages. `opened` contains the paths of the expanded instances.
-    """
+    """Reader of one stage, which has the name `source` in messages and expanded instances at the paths `opened`."""
 
     pxr: Any
     stage: Any
@@ -433,7 +412,7 @@ class _Reader:
     _edges: list[_Edge] = field(default_factory=list)
     _read: dict[str, JointReading] = field(default_factory=dict)
     _single: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
-    # `root_joint` and `universe` are Pinocchio's names of the joint and the link of a moving base
+    # `root_joint` and `universe` are Pinocchio's names for a moving base.
     _names: dict[str, set[str]] = field(
         default_factory=lambda: {"link": {"universe"}, "joint": {"root_joint"}}
     )
@@ -444,7 +423,6 @@ class _Reader:
     _looked_at: set[str] = field(default_factory=set)
 
     def read(self, articulation: str | None, files: tuple[str, ...]) -> Usd:
-        """Return the robot."""
         pxr, stage = self.pxr, self.stage
         self._unit = float(pxr.UsdGeom.GetStageMetersPerUnit(stage))
         if not (math.isfinite(self._unit) and self._unit > 0.0):
@@ -581,7 +559,6 @@ class _Reader:
         return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._unit), scale
 
     def _collect(self, prims: list[Any]) -> None:
-        """Collect the bodies and the joints of the stage."""
         physics = self.pxr.UsdPhysics
         for prim in prims:
             if (
@@ -614,7 +591,7 @@ class _Reader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._say("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # "newton:mimicJoint", or "physxMimicJoint:rotX:referenceJoint" with any direction
+            # The name may be "physxMimicJoint:rotX:referenceJoint", with any direction.
             own = _MIMIC_RULE.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
@@ -626,14 +603,13 @@ class _Reader:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # `MjcEqualityJointAPI` repeats the rule of `NewtonMimicAPI`, and may add terms of higher
-                # degree
+                # `MjcEqualityJointAPI` repeats the rule of `NewtonMimicAPI`, and may add terms of higher degree.
                 if more := [name for name in _HIGHER if self._value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._say("left-out-of-usd", path, what)
                 continue
             unread.append(schema)
-        # if the joint is not in the tree, `remarks` already contains the reason
+        # If the joint is not in the tree, `remarks` already contains the reason.
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
@@ -648,10 +624,7 @@ class _Reader:
     # -- joints --------------------------------------------------------------------------------------
 
     def _edge(self, prim: Any) -> _Edge | None:
-        """Return a joint that connects two bodies, or a body and the world.
-
-        If the prim is not such a joint, report it and return None.
-        """
+        """Return a joint that connects two bodies, or a body and the world; report any other joint."""
         path = str(prim.GetPath())
         if self._value(prim, "physics:jointEnabled") is False:
             self._say("left-out-of-usd", path, "this joint is disabled")
@@ -696,10 +669,7 @@ class _Reader:
         return edge
 
     def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
-        """Convert a pose in the world (`body` is None) to the stage's up axis.
-
-        Return a pose in a body unchanged.
-        """
+        """Convert a pose in the world (`body` is None) to the stage's up axis; return other poses unchanged."""
         return T if body is not None else pose(self._up.T) @ T
 
     def _side(
@@ -747,12 +717,8 @@ class _Reader:
 
         The bounds are 0 if the file stores all transforms in double precision. If the file stores a rotation
         in single precision, rounding rotates the prim, and moves the prims below. The function ignores
-        transforms in half precision.
-
-        Args:
-            path: Path of the prim.
-            body: Path of the body; None is the world.
-            length: Sum of the lengths (m) of the translations from the body to the prim.
+        transforms in half precision. `length` is the sum of the lengths (m) of the translations from the body
+        to the prim. The body None is the world.
         """
         moved = turned = False
         geometry, prim = self.pxr.UsdGeom, self.stage.GetPrimAtPath(path)
@@ -775,8 +741,7 @@ class _Reader:
     def _motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return the kind, the axis, the limits (rad or m) and the free directions of a joint.
 
-        Raises:
-            InputError: urdfkin has no such joint.
+        Raise InputError if urdfkin has no such joint.
         """
         physics, path = self.pxr.UsdPhysics, f"{self.source}: joint {prim.GetPath()}"
         if prim.IsA(physics.FixedJoint):
@@ -841,9 +806,8 @@ class _Reader:
     def _end(self, prim: Any, name: str) -> float:
         """Return the lower or upper limit of a `PhysicsJoint` in one of its six directions.
 
-        Raises:
-            InputError: a layer of the stage contains `None` for the limit. OpenUSD's parser of UsdPhysics
-                does not replace `None` by the default value, unlike other readers.
+        Raise InputError if a layer of the stage contains `None` for the limit. OpenUSD's parser of UsdPhysics
+        does not replace `None` by the default value, unlike other readers.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
@@ -915,7 +879,7 @@ class _Reader:
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # a single body that is fixed to the world is not a robot
+        # A single body that is fixed to the world is not a robot.
         found = [
             group
             for group in groups.values()
@@ -923,14 +887,14 @@ class _Reader:
         ]
         for group in found:
             self._name(group)
-        # if the base of an articulation is not a rigid body, several groups are attached to the world
+        # If the base of an articulation is not a rigid body, several groups are attached to the world.
         merged: dict[str, list[_Articulation]] = {}
         for group in found:
             merged.setdefault(self._root(group) or group.path, []).append(group)
         found = [own[0] if len(own) == 1 else self._together(own, path) for path, own in merged.items()]
         paths = Counter(group.path for group in found)
         for group in found:
-            if paths[group.path] > 1:  # a joint between them is missing: name each by its root body
+            if paths[group.path] > 1:  # a joint between these groups is missing
                 group.path = self._root(group) or group.bodies[0]
         return found
 
@@ -943,10 +907,7 @@ class _Reader:
         group.path = group.path or self._root(group) or group.bodies[0]
 
     def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
-        """Return the articulation with the path or name `wanted`.
-
-        If `wanted` is the path of another prim, merge all articulations below it.
-        """
+        """Return the articulation with a path or name, or all articulations below the path of another prim."""
         if not found:
             raise InputError(
                 "this stage has no joint between bodies",
@@ -998,7 +959,6 @@ class _Reader:
     # -- the tree ------------------------------------------------------------------------------------
 
     def _tree(self, group: _Articulation) -> tuple[KinematicTree, dict[str, str]]:
-        """Return the tree of an articulation, and the prim of each link."""
         root = self._root(group)
         around: dict[str | None, list[_Edge]] = {}
         for edge in group.edges:
@@ -1347,10 +1307,7 @@ class _Reader:
                     self._layer(layer.pseudoRoot, name, prim)
 
     def _layer(self, root: Any, name: str, prim: Any) -> None:
-        """Compare the unit and the up axis of a layer with the stage.
-
-        `prim` is the first prim in the layer.
-        """
+        """Compare the unit and the up axis of a layer, whose first prim is `prim`, with the stage."""
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))

@@ -155,11 +155,9 @@ def as_json(
 ) -> str:
     """Return the findings as one JSON document.
 
-    `{"schema": "urdfkin-findings", "version": 1, "urdfkin": "...", "files": [...], "findings": [...],
-    "silenced": [...]}`. An entry of "findings" has the fields of `Finding`, and the field `title` with the
-    title of the finding's code. An entry of "silenced" has one more field, `reason`: the reason in the
-    comment that silences the finding. The positions in a `fix` are byte indices. The byte after a byte order
-    mark has the index 0.
+    An entry of "findings" has the fields of `Finding`, and the `title` of its code. An entry of "silenced"
+    also has the `reason` in the comment that silences the finding. The positions in a `fix` are byte indices.
+    The byte after a byte order mark has the index 0.
     """
     document = {
         "schema": "urdfkin-findings",
