@@ -21,28 +21,22 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
-#: Precedence of operators, lowest first: a sum, a change of sign, a product, and an operand that needs no
-#: brackets.
+#: Precedence of a sum, a change of sign, a product, and an operand that needs no brackets, lowest first.
 _SUM, _SIGN, _PRODUCT, _ATOM = range(4)
 _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
 
 @dataclass(frozen=True)
 class Code:
-    """The functions of a frame.
+    """The functions of a frame. No name contains characters that end a comment in the exported file.
 
     Attributes:
         name: Prefix of the names of functions.
-        robot: The robot's name. A name in this class contains no characters that end a comment in the
-            exported file.
-        frame: The frame's name.
-        reference: The reference frame.
-        functions: One function for each quantity.
         coordinates: Names of the coordinates of q.
         rates: Names of the coordinates of v and a.
         joints: Names of the path's moving joints.
-        words: Identifiers in the exported code. The keys "q", "v" and "a" have a list of identifiers for the
-            numbers of the input. The key "s" has a list of identifiers for the path's joints.
+        words: Identifiers in the exported code, by "q", "v" and "a" for the numbers of the input, and by "s"
+            for the path's joints.
         about: Lines of the file's header that contain the Denavit-Hartenberg table or the screws; empty for
             code from a URDF's joints.
         vouched: The comparison with Pinocchio and the test vectors; None for code that urdfkin compiles for
@@ -73,12 +67,10 @@ class Code:
 
     @property
     def nq(self) -> int:
-        """Length of q."""
         return len(self.coordinates)
 
     @property
     def nv(self) -> int:
-        """Length of v and a."""
         return len(self.rates)
 
     def widths(self, function: Function) -> dict[str, int]:
@@ -87,10 +79,7 @@ class Code:
 
     @property
     def head(self) -> list[str]:
-        """The lines of a file's header, without comment marks.
-
-        If the code is not verified, the first line says UNVERIFIED.
-        """
+        """The lines of a file's header, without comment marks; the first may say UNVERIFIED."""
         verdict, *rest = self.proof.lines
         lines = [verdict] if not self.proof.certificate.verified else []
         lines += [
@@ -151,7 +140,7 @@ def code_of(
     code = replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
 
     def exact() -> Code:
-        from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only for computer algebra
+        from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only computer algebra needs this module
 
         functions, vouched = exact_functions(
             verifier, plan_of, frame, reference, code.functions, proof, verify
@@ -209,12 +198,7 @@ def _rows(names: Collection[str]) -> list[Quantity]:
 class Writer:
     """Writes a function's expressions in a language in which a sum is written as a + b.
 
-    Args:
-        code: The exported code, which contains the names of inputs and joints.
-        function: A function of this code.
-        literal: Function that writes a constant.
-        sine: Whether the written code computes sines and cosines. If False, they are inputs of the written
-            code.
+    `literal` writes a constant. Without `sine`, sines and cosines are inputs of the written code.
     """
 
     def __init__(
@@ -259,7 +243,6 @@ class Writer:
         return self.code.frame if place == len(joints) else "results"
 
     def results(self) -> list[str]:
-        """Return the values of the result as text, row by row."""
         return [self.text(x) for x in self.function.results]
 
     def text(self, x: Number, level: int = _SUM) -> str:
@@ -279,15 +262,12 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # The brackets of a + (b + c) remain, because the check with Pinocchio adds in this order, too.
+            # The brackets of a + (b + c) keep the order of the check with Pinocchio.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return the text of an expression that contains inputs and constants, but no other variables.
-
-        Angles are written like this, because the exported code computes angles before it assigns variables.
-        """
+        """Return the text of an expression, such as an angle, without variables that are not inputs."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.words:

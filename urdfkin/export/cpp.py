@@ -1,8 +1,8 @@
 """Write a header with function templates for any number type: for C++11, or for CUDA.
 
-Examples are `double`, `float`, and the types of libraries for automatic differentiation. CUDA's header has
-the same functions for the host and the device. The header for CUDA also has a kernel for batches, and C
-functions that start the kernel.
+The number types are `double`, `float`, and the types of libraries for automatic differentiation. The header
+for CUDA has the same functions for the host and the device. It also has a kernel for batches, and C functions
+that start the kernel.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Compute the forward recursion of the textbook's section 7.7 for one path, for any type of number.
 
-The recursion goes from joint to joint. At each joint, it translates along the rigid link, applies a constant
-rotation, and then applies the motion of the joint about or along z. Placements and Jacobians are computed in
-the axes of the world frame, as in the textbook. Velocities and accelerations are computed in the axes of each
-link's frame, where joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes
-of the world frame, it is then rotated joint by joint. To rotate the result needs a third fewer operations
-than to compute the rotation matrix R.
+At each joint, the recursion translates along the rigid link, applies a constant rotation, and then applies
+the motion of the joint about or along z. Placements and Jacobians are computed in the axes of the world
+frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame, where
+joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes of the world frame,
+it is then rotated joint by joint. To rotate the result needs a third fewer operations than to compute the
+rotation matrix R.
 
 `urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree.
 """
@@ -31,12 +31,10 @@ class Kind:
 
     Attributes:
         chapter: A module with the textbook's equations as functions that accept numbers of this kind.
-        sine_cosine: Function that returns sine and cosine of an angle.
-        root: Function that returns the square root.
-        entering: Function that the recursion calls at each joint, at the final frame, and before the results.
-            The argument of the function is the number of earlier calls.
-        reached: Function that the recursion calls after each joint and after the final frame. The arguments
-            of the function are the number of earlier calls and the new state.
+        entering: The recursion calls this function at each joint, at the final frame, and before the results,
+            with the number of earlier calls.
+        reached: The recursion calls this function after each joint and after the final frame, with the number
+            of earlier calls and the new state.
     """
 
     chapter: Any
@@ -120,7 +118,6 @@ class TreeRecursion(Recursion):
 
     @property
     def columns(self) -> list[Column]:
-        """The columns of the frame's Jacobian."""
         found = []
         for row, factor in zip(self.plan.columns.tolist(), self.plan.multipliers.tolist(), strict=True):
             s = self.states[row[ColumnField.STEP]]
@@ -134,9 +131,9 @@ class TreeRecursion(Recursion):
 def _without_rounding(x: Sequence[float]) -> Vector:
     """Return a constant vector in which entries below the rounding of the largest entry are replaced by 0.
 
-    For example, the cosine of the double nearest to pi/2 is 6e-17. Without this function, the exported code
-    would contain useless products with such numbers. The error bounds of `urdfkin.kinematics.roundings`
-    include the error that this replacement causes. Exact constants have no rounding.
+    For example, the cosine of the double nearest to pi/2 is 6e-17. The exported code would contain useless
+    products with such numbers. The error bounds of `urdfkin.kinematics.roundings` include the error that this
+    replacement causes. Exact constants have no rounding.
     """
     if not all(isinstance(c, float) for c in x):
         return x[0], x[1], x[2]
@@ -180,10 +177,7 @@ def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Refere
 
 
 def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the derivative of each Jacobian entry with respect to each coordinate.
-
-    The terms are those of equation 7.126, the time derivative of the Jacobian.
-    """
+    """Return the derivative of each Jacobian entry with respect to each coordinate (the terms of 7.126)."""
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
     for of, by, factor, six in path.hessian(path.end, path.columns, reference):
@@ -193,7 +187,7 @@ def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -
 
 
 def _recursion(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> TreeRecursion:
-    # The reference WORLD needs the position p, which is computed in the axes of the world frame.
+    # The reference WORLD needs the position p, which is computed in world axes.
     return TreeRecursion(plan, kind, inputs, own=not reference.at_world)
 
 
@@ -202,7 +196,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
         case Reference.LOCAL_WORLD_ALIGNED:
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
-        case Reference.LOCAL | Reference.WORLD:  # the vectors are already in the axes of this frame
+        case Reference.LOCAL | Reference.WORLD:  # the vectors are already in these axes
             pass
         case _:
             assert_never(reference)
@@ -213,7 +207,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-#: For each quantity by its name: the function that computes it.
+#: The function that computes each quantity, by the quantity's name.
 QUANTITIES: dict[str, Callable[[CompiledTree, Kind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,

@@ -401,7 +401,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _Reader:
-    """Reader of one stage, which has the name `source` in messages and expanded instances at the paths `opened`."""
+    """Reader of one stage. `source` is its name in messages, `opened` the paths of expanded instances."""
 
     pxr: Any
     stage: Any
@@ -603,7 +603,7 @@ class _Reader:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # `MjcEqualityJointAPI` repeats the rule of `NewtonMimicAPI`, and may add terms of higher degree.
+                # This schema repeats the rule of `NewtonMimicAPI`, and may add terms of higher degree.
                 if more := [name for name in _HIGHER if self._value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._say("left-out-of-usd", path, what)
@@ -669,7 +669,7 @@ class _Reader:
         return edge
 
     def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
-        """Convert a pose in the world (`body` is None) to the stage's up axis; return other poses unchanged."""
+        """Convert a pose in the world (`body` is None) to the stage's up axis; other poses stay."""
         return T if body is not None else pose(self._up.T) @ T
 
     def _side(
@@ -907,7 +907,7 @@ class _Reader:
         group.path = group.path or self._root(group) or group.bodies[0]
 
     def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
-        """Return the articulation with a path or name, or all articulations below the path of another prim."""
+        """Return the articulation with a path or name, or all articulations below another prim."""
         if not found:
             raise InputError(
                 "this stage has no joint between bodies",

@@ -23,7 +23,7 @@ from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion
 from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
-#: The colour of each part of the acceleration and of their sum, as red, green and blue from 0 to 255.
+#: Red, green and blue, from 0 to 255, of each part of the acceleration and of their sum.
 PART_COLOURS = {
     "transverse": (0, 114, 178),
     "centripetal": (213, 94, 0),
@@ -38,13 +38,7 @@ _SHARE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Arrows:
-    """Arrows in the world.
-
-    Attributes:
-        points: (n, 2, 3) start and end of each arrow, metres.
-        colours: (n, 3) red, green, blue, 0 to 255.
-        names: (n,) name of each arrow.
-    """
+    """Arrows in the world: points (n, 2, 3) in metres, and colours (n, 3) from 0 to 255."""
 
     points: FloatArray
     colours: np.ndarray
@@ -53,13 +47,7 @@ class Arrows:
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """An ellipsoid in the world.
-
-    Attributes:
-        half: (3,) half-lengths in metres, as drawn.
-        centre: (3,) metres.
-        wxyz: (4,) orientation, scalar first.
-    """
+    """An ellipsoid in the world: half-lengths and centre (3,) in metres, and a quaternion wxyz."""
 
     half: FloatArray
     centre: FloatArray
@@ -69,13 +57,8 @@ class Ellipsoid:
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
     """Return arrows for the columns of the Jacobian, in world axes, starting at the frame's origin.
 
-    Each column is the frame's velocity when one joint moves with unit velocity.
-
-    Args:
-        x: A motion of one sample in LOCAL_WORLD_ALIGNED.
-        rates: The name of each column.
-        reach: The robot's size in metres; it scales the arrows.
-        angular: Whether to draw angular instead of linear velocities.
+    Each column is the frame's velocity when one joint moves with unit velocity. The motion x has one sample
+    in LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the arrows.
     """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
@@ -110,12 +93,8 @@ def _arrows(
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
     """Return the ellipsoid of the frame's velocities for joint velocities of length one.
 
-    A direction without motion is drawn with the smallest visible thickness.
-
-    Args:
-        x: A motion of one sample in LOCAL_WORLD_ALIGNED.
-        reach: The robot's size in metres; it scales the ellipsoid.
-        angular: Whether to use the angular instead of the linear velocity.
+    A direction without motion is drawn with the smallest visible thickness. The motion x has one sample in
+    LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the ellipsoid.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -132,20 +111,17 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Maximum time (s) between the opening of a page and its final layout.
+#: Longest time (s) between the opening of a page and its final layout.
 _OPENING = 15.0
-#: `_FROM` is the direction from the robot to the camera. The robot fills the fraction `_FILLED` of the view.
-#: `_FOV` is viser's vertical field of view in rad.
+#: Direction from the robot to the camera, and the fraction of the view that the robot fills.
+#: `_FOV` is viser's vertical field of view (rad).
 _FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
 
 
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
     """Return the position of the camera and the point it looks at, so that points (n, 3) fill the view.
 
-    Args:
-        points: Points of the robot in the world, metres.
-        aspect: Width of the view divided by its height.
-        fov: Vertical field of view, rad.
+    The points are in metres, the vertical field of view is in rad, and the aspect is width divided by height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     back = _FROM / np.linalg.norm(_FROM)
@@ -158,7 +134,7 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
 
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
-#: `SHAPES` are the display modes of the shapes. `NAMES` are the names that can be shown beside frames.
+#: The display modes of the shapes.
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
@@ -168,9 +144,7 @@ _NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
-    """A robot in viser's scene.
-
-    Each link has a frame with its shapes, or with a line to its parent if shapes are missing.
+    """A robot in viser's scene, with a frame for each link, and its shapes or a line to its parent.
 
     Attributes:
         missing: Meshes that cannot be shown.
@@ -219,10 +193,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes.
-
-        Return True if any shape is missing, or if there are none; the viewer then shows the skeleton.
-        """
+        """Add the shapes; return whether the viewer shows the skeleton, because one or all are missing."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
@@ -274,7 +245,6 @@ class Stage:
                 )
 
     def _add_names(self, kind: str, tree: KinematicTree) -> list[Any]:
-        """Add labels of the links or the moving joints at their frames."""
         of_joints = [joint.name if joint.kind.nv else "" for joint in tree.joints]
         words = tree.links if kind == "links" else ("", *of_joints)
         return [
@@ -290,7 +260,6 @@ class Stage:
         ]
 
     def _add_transparent(self) -> list[Any]:
-        """Add transparent copies of the shapes; this happens at their first use."""
         copies = []
         for shape, solid in self._shapes:
             name = f"{solid.name}-transparent"
@@ -302,15 +271,11 @@ class Stage:
         return copies
 
     def look(self) -> None:
-        """Reset the camera of every client."""
         for client in self._server.get_clients().values():
             self._look(client)
 
     def _welcome(self, client: Any) -> None:
-        """Set the camera of a new client.
-
-        The camera is set again when the panel of the page has reduced the width of the view.
-        """
+        """Set the camera of a new client, and again when the panel has reduced the width of the view."""
         begin, aspects = time.monotonic(), [0.0]
 
         def fit(_: Any) -> None:
@@ -383,10 +348,7 @@ class Stage:
         )
 
     def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
-        """Draw the frames, offsets d and lengths a of a Denavit-Hartenberg table at its coordinates q.
-
-        None removes them.
-        """
+        """Draw the frames, offsets d and lengths a of a table at its coordinates q; None removes them."""
         for handle in self._dh:
             handle.remove()
         self._dh = []
@@ -426,8 +388,7 @@ def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatA
     """
     starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
     if str(table.convention) == "standard":
-        # In the standard convention, d comes first and lies on the previous z axis. The length a comes next
-        # and lies on the new x axis.
+        # In the standard convention, d lies on the previous z axis, and then a lies on the new x axis.
         a = np.array([row.a for row in table.rows]).reshape(-1, 1)
         return starts, ends - a * frames[1:, :3, 0], ends
     a = np.array([row.a for row in table.rows]).reshape(-1, 1)

@@ -1,7 +1,6 @@
 """The viewer: a panel with sliders and checked numbers beside the robot's picture.
 
-When the user moves a slider, it reports only its own number. If the program sets a value, the slider shows
-this value but reports no change.
+A slider that the user moves reports only its own number. A slider that the program sets reports no change.
 """
 
 from __future__ import annotations
@@ -43,12 +42,11 @@ from urdfkin.view.stage import (
 
 #: A joint with a larger range than this counts as unlimited, like a wheel.
 _FAR = 100.0
-#: A slider or an arrow key changes an angle by `_DEGREES` if the viewer shows degrees, and by `_RADIANS` if
-#: it shows radians. For a number that is not an angle, the change is the slider's range divided by `_STEPS`,
-#: rounded down to 1, 2 or 5 times a power of ten.
+#: Change of an angle by an arrow key, in degrees and in radians, and the steps of other sliders.
+#: A step is rounded down to 1, 2 or 5 times a power of ten.
 _DEGREES, _RADIANS, _STEPS = 1.0, 0.01, 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Default ranges: joint velocity in rad/s or m/s, and joint acceleration in rad/s^2 or m/s^2.
+#: Default ranges of joint velocities (rad/s or m/s) and joint accelerations (rad/s^2 or m/s^2).
 _RATE, _SECOND_RATE = 3.0, 5.0
 #: Largest number of missing meshes that a message names.
 _MOST_MISSING = 5
@@ -60,7 +58,6 @@ class Row:
 
     Attributes:
         at: Index in the vector.
-        name: Name of the number.
         turns: Whether the number is an angle or a derivative of an angle.
         lower, upper: Range of the slider.
     """
@@ -80,8 +77,7 @@ class Sliders:
         folder: The folder of the sliders.
         rows: The numbers to show.
         rate: Text after the unit: "" for q, "/s" for v, "/s²" for a.
-        moved: Function that is called when the user moves a slider; its arguments are the index and the new
-            number.
+        moved: Function that is called with the index and the new number when the user moves a slider.
     """
 
     def __init__(
@@ -92,7 +88,7 @@ class Sliders:
         self.handles: list[Any] = []
 
     def build(self, values: FloatArray, *, degrees: bool) -> None:
-        """Create sliders in the given unit; they replace the previous sliders."""
+        """Replace the sliders by sliders in the given unit."""
         orders = [handle.order for handle in self.handles] or [None] * len(self.rows)
         for handle in self.handles:
             handle.remove()
@@ -137,7 +133,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # A slider that the user has just moved keeps its exact value.
+                # A slider that the user moves keeps its exact value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -165,10 +161,7 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
 
 
 def coordinate_rows(robot: Robot) -> list[Row]:
-    """Describe a slider for each coordinate that can change; the slider's range is the joint's limits.
-
-    Quaternions have no sliders.
-    """
+    """Describe a slider within the joint's limits for each coordinate that can change, but no quaternion."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
@@ -253,7 +246,6 @@ def numbers(x: FrameMotion) -> str:
 
 
 def check_line(x: FrameMotion) -> str:
-    """Return a line with the result of Pinocchio's check."""
     if x.not_verified is not None:
         return f"**! not verified** by Pinocchio {version()}: {markdown_text(x.not_verified)}"
     figures = ", ".join(f"{quantity} {check.units[0]:.2g}" for quantity, check in x.checks.items())
@@ -262,7 +254,6 @@ def check_line(x: FrameMotion) -> str:
 
 
 def missing_words(missing: Iterable[Shape]) -> str:
-    """Return the names of the meshes that cannot be shown, and the remedy."""
     names = list(dict.fromkeys(shape.address or shape.link for shape in missing))
     shown = "".join(f"\n- {markdown_text(name)}" for name in names[:_MOST_MISSING])
     more = f"\n- and {len(names) - _MOST_MISSING} more" if len(names) > _MOST_MISSING else ""
@@ -277,7 +268,6 @@ def missing_words(missing: Iterable[Shape]) -> str:
 
 
 def legend() -> str:
-    """Return the legend of the acceleration's parts, with their colours."""
     return " ".join(
         f'<span style="color: rgb{colour}">■</span> {name}' for name, colour in PART_COLOURS.items()
     )
@@ -304,8 +294,6 @@ class Viewer:
 
     Attributes:
         q: (nq,) configuration of the sliders, rad and m.
-        v: (nv,) joint velocities.
-        a: (nv,) joint accelerations.
         motion: The motion of the chosen frame in the chosen reference frame, with its check.
         player: The controls of the trajectory; None without one.
     """
@@ -358,7 +346,7 @@ class Viewer:
     def _build(self, trajectory: Trajectory | None) -> None:
         gui, robot = self.server.gui, self.robot
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
-        gui.main_panel.dock_right()  # show the controls beside the picture, not over it
+        gui.main_panel.dock_right()  # the controls are beside the picture, not over it
         gui.set_panel_label(printable(robot.name))
         if self.stage.missing:
             gui.add_markdown(missing_words(self.stage.missing))
@@ -449,11 +437,7 @@ class Viewer:
             self.update()
 
     def set_q(self, q: Given) -> None:
-        """Move the robot and all sliders to a configuration.
-
-        Raises:
-            InputError: `q` is not a valid configuration of the robot.
-        """
+        """Move the robot and all sliders to a configuration, or raise InputError."""
         with self._lock:
             self.q = checked(self.robot.tree, q, "q").copy()
             self.sliders.show(self.q)
@@ -461,7 +445,6 @@ class Viewer:
             self.update()
 
     def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
-        """Set the configuration, the joint velocities and the joint accelerations in one step."""
         with self._lock:
             self.q, self.v, self.a = q.copy(), v.copy(), a.copy()
             for sliders, values in ((self.sliders, q), (self.rates, v), (self.second_rates, a)):
@@ -470,14 +453,12 @@ class Viewer:
             self.update()
 
     def _save(self, client: Any) -> None:
-        """Send a client a picture of its view, in the size of its window."""
         if client is not None:
             height, width = client.camera.image_height, client.camera.image_width
             picture = as_png(client.get_render(height=height, width=width, timeout=60.0))
             client.send_file_download(f"{self.file_name}.png", picture, save_immediately=True)
 
     def set_rates(self, v: FloatArray, a: FloatArray) -> None:
-        """Set the joint velocities and accelerations, and their sliders."""
         with self._lock:
             self.v, self.a = v, a
             self.rates.show(v)
@@ -531,7 +512,7 @@ class Viewer:
                 try:
                     self._table = self.robot.dh(self.frame.value, convention=self.dh.value)
                     table = self._table
-                    # Escape names: code formatting is unsafe, because viser reads images even inside code.
+                    # Code formatting would be unsafe: viser reads images even inside code.
                     self.dh_words.content = markdown_text(f"{table.base_frame} to {table.tip_frame}")
                 except UrdfkinError as error:
                     self.dh_words.content = markdown_text(str(error))
@@ -542,7 +523,6 @@ class Viewer:
     # -- drawing -------------------------------------------------------------------------------------
 
     def update(self) -> None:
-        """Compute, check and draw everything."""
         with self._lock:
             self.motion = self._motion(Reference.of(self.reference.value))
             aligned = Reference.LOCAL_WORLD_ALIGNED
