@@ -21,7 +21,7 @@ import codecs
 import re
 import unicodedata
 from array import array
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import Enum
 from itertools import islice
@@ -281,10 +281,18 @@ class Findings(list[Finding], Displayable):
 
     def _sheet(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
-        counts = {s: sum(f.count for f in self if f.severity is s) for s in Severity}
-        totals = [f"{n} {s.value}{'s' if n > 1 else ''}" for s, n in counts.items() if n]
         table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
-        return TextDocument(", ".join(totals) or "no findings", table)
+        return TextDocument(totals(self), table)
+
+
+def severity_counts(findings: Sequence[Finding]) -> dict[str, int]:
+    return {s.value: sum(f.count for f in findings if f.severity is s) for s in Severity}
+
+
+def totals(findings: Sequence[Finding]) -> str:
+    """Return the number of errors, warnings and notes as text."""
+    words = [f"{n} {word}{'s' if n > 1 else ''}" for word, n in severity_counts(findings).items() if n]
+    return ", ".join(words) or "no findings"
 
 
 def _lines(lines: tuple[int, ...], shown: int = 4) -> str:

@@ -19,7 +19,7 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
-from urdfkin.urdf.mjcf import UNBOUNDED
+from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, unique
 from urdfkin.urdf.parser import QUATERNION
 from urdfkin.urdf.reader import joint_rows, root_link
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
@@ -191,13 +191,13 @@ class _ModelReader:
         self.model = model
         self.frames = list(model.frames)
         self.kinds = [str(frame.type) for frame in self.frames]
-        self.names: dict[str, set[str]] = {"link": set(), "joint": set(map(str, model.names))}
+        self.link_names, self.joint_names = set[str](), set(map(str, model.names))
         self.places = [np.array(frame.placement.homogeneous) for frame in self.frames]
         self.bodies = dict(self._bodies_on_joints())
         joints = range(int(model.njoints))
         bodies = self.bodies
         names = {j: self.frames[bodies[j]].name if j in bodies else self._default_name(j) for j in joints}
-        self.carriers = {j: self._new("link", name) for j, name in names.items()}
+        self.carriers = {j: unique(name, self.link_names) for j, name in names.items()}
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
@@ -209,13 +209,6 @@ class _ModelReader:
 
     def _default_name(self, joint: int) -> str:
         return f"{self.model.names[joint]}_link" if joint else _ROOT
-
-    def _new(self, kind: str, name: str) -> str:
-        """Return the name, with underscores appended until it is unique."""
-        while name in self.names[kind]:
-            name += "_"
-        self.names[kind].add(name)
-        return name
 
     def read(self) -> Modelled:
         """Convert all frames, then all moving joints. In a model, parent frames precede child frames."""
@@ -254,11 +247,11 @@ class _ModelReader:
         link, T = self._attachment(frame, joint, self.places[i])
         if kind == "FIXED_JOINT":
             body = next((f for f in self.frames[i + 1 :] if int(f.parentFrame) == i), None)
-            child, name = self._new("link", body.name if body is not None else frame.name), frame.name
+            child = unique(frame.name if body is None else body.name, self.link_names)
+            name = frame.name
         else:
-            child, name = self._new("link", frame.name), f"{frame.name}_fixed"
-        fixed_joint = Joint(self._new("joint", name), JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
-        self.rows.append((fixed_joint, link, child))
+            child, name = unique(frame.name, self.link_names), f"{frame.name}_fixed"
+        self.rows.append((fixed_joint(unique(name, self.joint_names), T), link, child))
         self.links[i] = child
 
     def _joint(self, j: int, T: FloatArray) -> Joint:

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -454,21 +454,22 @@ class _Reader:
     mimic_equalities: dict[int, str] = field(default_factory=dict)
     apart: set[int] = field(default_factory=set)
     _joints: list[tuple[Joint, str, str]] = field(default_factory=list)
-    _names: dict[str, set[str]] = field(default_factory=lambda: {"link": set(), "joint": set()})
+    _link_names: set[str] = field(default_factory=set)
+    _joint_names: set[str] = field(default_factory=set)
     _links: list[str] = field(default_factory=list)
     _hinges: dict[int, str] = field(default_factory=dict)
 
     def tree(self) -> KinematicTree:
         m = self.model
-        self._links = [self._new("link", m.body(i).name or f"body{i}") for i in range(m.nbody)]
-        self._hinges = {i: self._new("joint", m.joint(i).name or f"joint{i}") for i in range(m.njnt)}
+        self._links = [unique(m.body(i).name or f"body{i}", self._link_names) for i in range(m.nbody)]
+        self._hinges = {i: unique(m.joint(i).name or f"joint{i}", self._joint_names) for i in range(m.njnt)}
         for i in range(m.nbody):
             self.frames[self._links[i]] = "body", i
             if i:
                 self._body(i)
         for i in range(m.nsite):
             if name := m.site(i).name:
-                link = self._new("link", name)
+                link = unique(name, self._link_names)
                 self.frames[link] = "site", i
                 T = _pose(m.site_pos[i], m.site_quat[i])
                 self._fix(T, self._links[m.site_bodyid[i]], link)
@@ -476,16 +477,9 @@ class _Reader:
         joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in self._joints]
         return build_tree(self.name, self._links[0], joints)
 
-    def _new(self, kind: str, name: str) -> str:
-        """Return the name, with underscores appended until it is unique."""
-        while name in self._names[kind]:
-            name += "_"
-        self._names[kind].add(name)
-        return name
-
     def _fix(self, T: FloatArray, parent: str, child: str) -> None:
-        name = self._new("joint", f"{child}_fixed")
-        self._joints.append((Joint(name, JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0])), parent, child))
+        name = unique(f"{child}_fixed", self._joint_names)
+        self._joints.append((fixed_joint(name, T), parent, child))
 
     def _body(self, i: int) -> None:
         """Add the joints of a body one after the other, then its own link."""
@@ -499,7 +493,7 @@ class _Reader:
         for j in range(first, first + count):
             anchor, name = pose(p=m.jnt_pos[j]), self._hinges[j]
             ends_here = j == first + count - 1 and not m.jnt_pos[j].any()
-            child = link if ends_here else self._new("link", f"{name}_link")
+            child = link if ends_here else unique(f"{name}_link", self._link_names)
             joint, back = self._joint(j, name, T @ anchor)
             self._joints.append((joint, here, child))
             self.coordinates[name] = int(m.jnt_qposadr[j])
@@ -564,7 +558,7 @@ class _Reader:
             if rule is None:
                 names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
                 what = f"a constraint ({names}) that is no linear relation of two joints"
-            elif rule[0] in rules or _leads(rules, rule[1].leader, rule[0]):
+            elif rule[0] in rules or leads(rules, rule[1].leader, rule[0]):
                 what = f"joint {rule[0]} has two rules, or its rules form a circle"
             else:
                 rules[rule[0]] = rule[1]
@@ -573,7 +567,7 @@ class _Reader:
             self.apart.add(i)
             self.listed.append(Listed(what, where, moves=True))
         for name in rules:
-            yield name, _resolve(rules, name)
+            yield name, resolve(rules, name)
 
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
         """Return the name of the mimic joint y and its rule from an equality y - y0 = c0 + c1 (x - x0).
@@ -590,14 +584,26 @@ class _Reader:
         return self._hinges[y], Mimic(self._hinges[x], float(c[1]), float(y0 + c[0] - c[1] * x0))
 
 
-def _leads(rules: dict[str, Mimic], joint: str, to: str) -> bool:
+def unique(name: str, taken: set[str]) -> str:
+    """Append underscores to a name until it is unique, and add it to the taken names."""
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def fixed_joint(name: str, T: FloatArray) -> Joint:
+    return Joint(name, JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
+
+
+def leads(rules: Mapping[str, Mimic], joint: str, to: str) -> bool:
     """Return whether `joint` mimics `to`, directly or through other mimic joints."""
     while joint in rules and joint != to:
         joint = rules[joint].leader
     return joint == to
 
 
-def _resolve(rules: dict[str, Mimic], joint: str) -> Mimic:
+def resolve(rules: Mapping[str, Mimic], joint: str) -> Mimic:
     """Combine a chain of mimic rules into one rule, whose mimicked joint moves independently."""
     rule = rules[joint]
     while rule.leader in rules:

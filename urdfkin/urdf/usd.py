@@ -48,7 +48,7 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import MOST, read_start
 from urdfkin.system.lazy_import import install_remedy, installed_version
 from urdfkin.urdf.confinement import Ground
-from urdfkin.urdf.mjcf import UNBOUNDED
+from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, leads, resolve, unique
 from urdfkin.urdf.sources import USD
 
 #: Largest number of layers of a stage.
@@ -413,9 +413,8 @@ class _Reader:
     _read: dict[str, JointReading] = field(default_factory=dict)
     _single: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
     # `root_joint` and `universe` are Pinocchio's names for a moving base.
-    _names: dict[str, set[str]] = field(
-        default_factory=lambda: {"link": {"universe"}, "joint": {"root_joint"}}
-    )
+    _link_names: set[str] = field(default_factory=lambda: {"universe"})
+    _joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
     _unit: float = 1.0
     _up: FloatArray = field(default_factory=lambda: np.eye(3))
     _cache: Any = None
@@ -569,12 +568,8 @@ class _Reader:
             path = str(prim.GetPath())
             T, scale = self._placed(prim)
             if scale[0] < 0.0:
-                self._say(
-                    "mirrored-body",
-                    path,
-                    "the transform of this body mirrors it",
-                    "mirror the shapes instead",
-                )
+                what = "the transform of this body mirrors it"
+                self._say("mirrored-body", path, what, "mirror the shapes instead")
             self._bodies[path] = _Body(path, T, scale, self._owner(prim))
         for prim in prims:
             if prim.IsA(physics.Joint) and (edge := self._edge(prim)) is not None:
@@ -861,11 +856,9 @@ class _Reader:
                     continue
                 owners = {one for one in (owner[a], owner[b]) if one is not None}
                 if len(owners) > 1:
-                    self._say(
-                        "outside-joint",
-                        edge.path,
-                        f"this {_called(edge)} connects two articulations: {' and '.join(sorted(owners))}",
-                    )
+                    ours = " and ".join(sorted(owners))
+                    what = f"this {_called(edge)} connects two articulations: {ours}"
+                    self._say("outside-joint", edge.path, what)
                     continue
                 above[b] = a
                 owner[a] = next(iter(owners), None)
@@ -980,28 +973,27 @@ class _Reader:
                 reached.add(there)
                 ordered.append((edge, backwards))
                 open_.append(there)
-        links: dict[str | None, str] = {None: self._new("link", "world")} if root is None else {}
+        links: dict[str | None, str] = {None: unique("world", self._link_names)} if root is None else {}
         for path in [root, *(edge.ends[0 if back else 1] for edge, back in ordered)]:
             if path is not None:
-                links[path] = self._new("link", self._short(path))
-        names = {edge.path: self._new("joint", edge.name) for edge, _ in ordered}
+                links[path] = unique(self._short(path), self._link_names)
+        names = {edge.path: unique(edge.name, self._joint_names) for edge, _ in ordered}
         joints = [made for edge, back in ordered for made in self._joints(edge, names, links, backwards=back)]
         rules = dict(self._mimics([edge for edge, _ in ordered], names))
         joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in joints]
-        if outside := [edge for edge, _ in ordered if self._is_outside(edge, group)]:
-            for edge in outside:
-                self._say(
-                    "outside-joint", edge.path, f"this {_called(edge)} leads to a body outside {group.path}"
-                )
+        for edge, _ in ordered:
+            if self._is_outside(edge, group):
+                what = f"this {_called(edge)} leads to a body outside {group.path}"
+                self._say("outside-joint", edge.path, what)
         prims = {link: path for path, link in links.items() if path is not None}
         for path, parent in self._frames(list(prims.values())):
-            link = self._new("link", path.rpartition("/")[2])
+            link = unique(path.rpartition("/")[2], self._link_names)
             try:
                 T = inverse(self._bodies[parent].T) @ self._placed(self.stage.GetPrimAtPath(path))[0]
             except InputError as error:
                 self._say("unused-in-usd", path, f"this Xform is no link: {error.what}", error.remedy)
                 continue
-            joint = Joint(self._new("joint", f"{link}_fixed"), JointKind.FIXED, 0, T, _unit(0))
+            joint = fixed_joint(unique(f"{link}_fixed", self._joint_names), T)
             self._single[joint.name] = *self._stored(path, parent, joint.length), joint.length, 0.0, 0.0
             joints.append((joint, links[parent], link))
             prims[link] = path
@@ -1030,13 +1022,6 @@ class _Reader:
                 return "_".join(parts[-n:])
         return parts[-1]
 
-    def _new(self, kind: str, name: str) -> str:
-        """Return the name, with underscores appended until it is unique."""
-        while name in self._names[kind]:
-            name += "_"
-        self._names[kind].add(name)
-        return name
-
     def _joints(
         self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
@@ -1050,7 +1035,7 @@ class _Reader:
         self._single[names[edge.path]] = *edge.rounded, edge.size, shares, lever
         name, here, there = names[edge.path], links[parent], links[child]
         if edge.kind is JointKind.FIXED:
-            yield Joint(name, JointKind.FIXED, 0, A @ inverse(B), _unit(0)), here, there
+            yield fixed_joint(name, A @ inverse(B)), here, there
             return
         if edge.kind in (JointKind.PLANAR, JointKind.FLOATING):
             if backwards or (edge.kind is JointKind.FLOATING and parent is not None):
@@ -1079,36 +1064,20 @@ class _Reader:
         if direct:
             yield joint, here, there
             return
-        between = self._new("link", f"{joint.name}_link")
+        between = unique(f"{joint.name}_link", self._link_names)
         yield joint, here, between
-        yield (
-            Joint(self._new("joint", f"{there}_fixed"), JointKind.FIXED, 0, inverse(B), _unit(0)),
-            between,
-            there,
-        )
+        yield fixed_joint(unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
 
     def _limit(self, edge: _Edge) -> Limit | None:
         lower, upper = edge.limits
         turns, prim = edge.kind is not JointKind.PRISMATIC, edge.prim
-        rate = next(
-            (
-                float(x)
-                for x in (
-                    self._value(prim, word)
-                    for word in ("newton:velocityLimit", "physxJoint:maxJointVelocity")
-                )
-                if x is not None
-            ),
-            math.inf,
-        )
+        rates = (self._value(prim, name) for name in ("newton:velocityLimit", "physxJoint:maxJointVelocity"))
+        rate = next((float(x) for x in rates if x is not None), math.inf)
         rate = math.inf if not 0.0 < rate < _LARGEST else rate * (math.pi / 180.0 if turns else self._unit)
         if edge.kind is JointKind.CONTINUOUS:
             if math.isfinite(lower) or math.isfinite(upper):
-                self._say(
-                    "unused-in-usd",
-                    edge.path,
-                    "only a lower or only an upper limit; a URDF has both or none, so it has none",
-                )
+                what = "only a lower or only an upper limit; a URDF has both or none, so it has none"
+                self._say("unused-in-usd", edge.path, what)
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
         if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
@@ -1118,14 +1087,9 @@ class _Reader:
                 "write the limits in degrees",
             )  # fmt: skip
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            self._say(
-                "unused-in-usd",
-                edge.path,
-                f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m",
-            )
-            lower, upper = (
-                end if math.isfinite(end) else math.copysign(UNBOUNDED, end) for end in (lower, upper)
-            )
+            what = f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m"
+            self._say("unused-in-usd", edge.path, what)
+            lower, upper = (x if math.isfinite(x) else math.copysign(UNBOUNDED, x) for x in (lower, upper))
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -1167,35 +1131,25 @@ class _Reader:
     def _mimics(self, edges: Sequence[_Edge], names: Mapping[str, str]) -> Iterator[tuple[str, Mimic]]:
         """Yield the mimic rules of Newton and PhysX; chains are resolved."""
         by_path = {edge.path: edge for edge in edges}
-        rules: dict[str, tuple[str, float, float]] = {}
+        rules: dict[str, Mimic] = {}
         for edge in edges:
             for rule in self._rules(edge):
-                leader = by_path.get(rule[0])
+                leader = by_path.get(rule.leader)
                 if leader is None or leader.kind.nq != 1 or edge.kind.nq != 1 or leader is edge:
-                    self._say(
-                        "lost-mimic",
-                        edge.path,
-                        f"this joint mimics {rule[0] or 'nothing'}, which is no joint with one coordinate",
-                        "correct the relationship",
-                    )
-                elif edge.path in rules or _leads(rules, rule[0], edge.path):
-                    self._say(
-                        "lost-mimic",
-                        edge.path,
-                        "this joint has two mimic rules, or its rules form a circle",
-                        "remove a rule",
-                    )
+                    named = rule.leader or "nothing"
+                    what = f"this joint mimics {named}, which is no joint with one coordinate"
+                    self._say("lost-mimic", edge.path, what, "correct the relationship")
+                elif edge.path in rules or leads(rules, rule.leader, edge.path):
+                    what = "this joint has two mimic rules, or its rules form a circle"
+                    self._say("lost-mimic", edge.path, what, "remove a rule")
                 else:
                     rules[edge.path] = rule
-        for path, rule in rules.items():
-            leader_path, multiplier, offset = rule
-            while leader_path in rules:
-                further, m, c = rules[leader_path]
-                leader_path, multiplier, offset = further, multiplier * m, multiplier * c + offset
-            yield names[path], Mimic(names[leader_path], multiplier, offset)
+        for path in rules:
+            rule = resolve(rules, path)
+            yield names[path], replace(rule, leader=names[rule.leader])
 
-    def _rules(self, edge: _Edge) -> Iterator[tuple[str, float, float]]:
-        """Yield each mimic rule of a joint: (path of the mimicked joint, multiplier, offset in rad or m)."""
+    def _rules(self, edge: _Edge) -> Iterator[Mimic]:
+        """Yield each mimic rule of a joint, with the path of the mimicked joint, in rad or m."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
@@ -1205,7 +1159,8 @@ class _Reader:
             leader = _target(prim, "newton:mimicJoint")
             c0, c1 = self._value(prim, "newton:mimicCoef0"), self._value(prim, "newton:mimicCoef1")
             multiplier, offset = 1.0 if c1 is None else float(c1), 0.0 if c0 is None else float(c0)
-            yield leader, multiplier * self._ratio(edge, leader), offset * own
+            self._compare_units(edge, leader)
+            yield Mimic(leader, multiplier, offset * own)
             return
         for schema in schemas:
             base, _, freedom = schema.partition(":")
@@ -1216,13 +1171,14 @@ class _Reader:
                 self._value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
             )
             multiplier = -1.0 if gearing is None else -float(gearing)
-            yield leader, multiplier * self._ratio(edge, leader), -float(offset or 0.0) * own
+            self._compare_units(edge, leader)
+            yield Mimic(leader, multiplier, -float(offset or 0.0) * own)
 
     def _factor(self, kind: JointKind) -> float:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
-    def _ratio(self, edge: _Edge, leader: str) -> float:
-        """Return 1, the unit factor of a multiplier. Report a mimic rule between an angle and a length."""
+    def _compare_units(self, edge: _Edge, leader: str) -> None:
+        """Report a mimic rule between an angle and a length."""
         kinds = {edge.path: edge.kind for edge in self._edges}
         slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
         if len(slides) > 1:
@@ -1232,7 +1188,6 @@ class _Reader:
                 "a mimic rule between an angle and a length has no unit in the schema; m and rad are used",
                 "compare the joint with the simulator",
             )
-        return 1.0
 
     # -- the whole -----------------------------------------------------------------------------------
 
@@ -1242,12 +1197,8 @@ class _Reader:
         top = f"/{chosen.path.split('/')[1]}/".replace("//", "/")
         for path in self._bodies:
             if path not in joined and (path + "/").startswith(top):
-                self._say(
-                    "loose-body",
-                    path,
-                    "no joint connects this body with the robot",
-                    "add a joint, or remove PhysicsRigidBodyAPI",
-                )
+                what = "no joint connects this body with the robot"
+                self._say("loose-body", path, what, "add a joint, or remove PhysicsRigidBodyAPI")
 
     def _rest(
         self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
@@ -1276,22 +1227,13 @@ class _Reader:
         return q
 
     def _of_the_stage(self, rest: FloatArray) -> None:
-        geom = self.pxr.UsdGeom
         if not self.stage.HasAuthoredMetadata("metersPerUnit"):
             size = float(np.ptp(rest[:, :3, 3], axis=0).max(initial=0.0))
-            self._say(
-                "unit-scale",
-                "",
-                f"the stage has no metersPerUnit, so a unit is a centimetre: the robot spans {size:.3g} m",
-                "write metersPerUnit = 1 if lengths are metres",
-            )
+            what = f"the stage has no metersPerUnit, so a unit is a centimetre: the robot spans {size:.3g} m"
+            self._say("unit-scale", "", what, "write metersPerUnit = 1 if lengths are metres")
         if not self.stage.HasAuthoredMetadata("upAxis"):
-            self._say(
-                "up-axis",
-                "",
-                f"the stage has no upAxis, so {geom.GetStageUpAxis(self.stage)} is up",
-                'write upAxis = "Z"',
-            )
+            what = f"the stage has no upAxis, so {self.pxr.UsdGeom.GetStageUpAxis(self.stage)} is up"
+            self._say("up-axis", "", what, 'write upAxis = "Z"')
 
     def _layers(self, paths: Sequence[str]) -> None:
         """Report each layer that describes one of the prims in another unit or up axis than the stage."""
@@ -1348,12 +1290,8 @@ class _Reader:
         return False
 
     def _unused(self, prims: list[Any]) -> None:
-        counts: dict[str, int] = {}
-        for prim in prims:
-            if prim.IsA(self.pxr.UsdGeom.Gprim):
-                counts["shapes"] = counts.get("shapes", 0) + 1
-        if counts:
-            self._say("unused-in-usd", "", f"kinematics does not use the {counts['shapes']} shapes")
+        if count := sum(prim.IsA(self.pxr.UsdGeom.Gprim) for prim in prims):
+            self._say("unused-in-usd", "", f"kinematics does not use the {count} shapes")
 
 
 def _rounding(x: FloatArray) -> FloatArray:
@@ -1400,9 +1338,3 @@ def _unit(i: int) -> FloatArray:
 
 def _called(edge: _Edge) -> str:
     return f"{edge.kind.value} joint"
-
-
-def _leads(rules: Mapping[str, tuple[str, float, float]], joint: str, to: str) -> bool:
-    while joint in rules and joint != to:
-        joint = rules[joint][0]
-    return joint == to

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from urdfkin.urdf.findings import Finding, Fix, Rule, Severity
+from urdfkin.urdf.findings import Finding, Fix, Rule, Severity, severity_counts, totals
 from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, find_rule, page
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -124,10 +124,7 @@ def summary(findings: Sequence[Finding], files: int) -> str:
     >>> summary([], 1)
     'no findings in 1 file'
     """
-    where = f"{files} file" + ("" if files == 1 else "s")
-    counts = {severity: sum(f.count for f in findings if f.severity is severity) for severity in Severity}
-    parts = [f"{count} {s.value}{'' if count == 1 else 's'}" for s, count in counts.items() if count]
-    return f"{', '.join(parts)} in {where}" if parts else f"no findings in {where}"
+    return f"{totals(findings)} in {files} file" + ("" if files == 1 else "s")
 
 
 def statistics(findings: Sequence[Finding]) -> Iterator[str]:
@@ -164,7 +161,7 @@ def as_json(
         "version": JSON_VERSION,
         "urdfkin": version,
         "files": list(files),
-        "counts": {s.value: sum(f.count for f in findings if f.severity is s) for s in Severity},
+        "counts": severity_counts(findings),
         "findings": [_entry(finding) for finding in findings],
         "silenced": [_entry(finding) | {"reason": reason} for finding, reason in silenced],
     }
