@@ -80,14 +80,14 @@ def what(function: Function) -> str:
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
-def _parameters(function: Function, real: str) -> str:
+def parameters(function: Function, real: str) -> str:
     return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
 
 
 def _declarations(code: Code) -> Iterator[str]:
     yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
     for function in code.functions:
-        given = _parameters(function, f"{code.name.upper()}_REAL")
+        given = parameters(function, f"{code.name.upper()}_REAL")
         yield f"/* {what(function)} */"
         yield f"void {code.name}_{function.name}({given});"
         yield f"void {code.name}_{function.name}_batch(size_t n, {given});"
@@ -104,8 +104,8 @@ def _function(code: Code, function: Function) -> str:
         name=function.name,
         title=code.name,
         operations=function.operations,
-        given=f"({_parameters(function, 'real')})",
-        given_rest=f"{_parameters(function, 'real')})",
+        given=f"({parameters(function, 'real')})",
+        given_rest=f"{parameters(function, 'real')})",
         count=count,
         room=layout.room,
         inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",

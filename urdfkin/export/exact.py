@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -20,12 +19,10 @@ from urdfkin.compiled.plan import Column, CompiledTree, Geometry
 from urdfkin.dh.units import fraction_text, pi_fraction
 from urdfkin.export.expression import Graph, Node, Number
 from urdfkin.export.function import INPUTS, Function, function_of
-from urdfkin.export.proof import CHECKED, Proof
-from urdfkin.model.configuration import draw
+from urdfkin.export.proof import Proof, compared
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, Kind, enough_digits, exact, precision, read_exact
 from urdfkin.verify.verifier import Verifier
 
@@ -205,24 +202,18 @@ def exact_functions(
     the same functions with constants in double precision. Raise VerificationError if Pinocchio computes
     another result.
     """
-    tree, checker = verifier.tree, copy(verifier)  # the copy has a separate ledger
-    link, found, angles = tree.frame_link(frame), list[Function](), dict[Fraction, PiMultiple]()
-    drawn = draw(tree, CHECKED, np.random.default_rng(0), with_special=True)
+    tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):
         for other in functions:
             graph = ExactGraph()
-            plan = exact_plan(graph, verifier.text, tree, other.plan, link)
+            plan = exact_plan(graph, verifier.text, tree, other.plan, tree.frame_link(frame))
             found.append(function_of(plan, other.quantity, reference, graph))
             angles |= graph.recognised
         most = max((float(abs(ball(x) - ball(y)).upper()) for x, y in angles.items()), default=0.0)
-    for function in found:
-        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
-        call = Call(tree, plan_of, frame, reference, None, inputs)
-        values = _evaluated(function, (call.q, *call.rates))
-        checker.check(function.quantity, call, values, bool(checker.wanted(verify)))
+    certificate = compared(verifier, plan_of, frame, reference, found, _evaluated, verify)
     fields = {name: getattr(proof, name) for name in ("sha256", "urdfkin", "vectors", "lock")}
     return tuple(found), ExactProof(
-        **fields, certificate=checker.certificate(), single={}, angles=len(angles), most=most
+        **fields, certificate=certificate, single={}, angles=len(angles), most=most
     )
 
 

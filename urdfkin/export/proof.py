@@ -138,23 +138,36 @@ def prove(
     verify: bool | None,
 ) -> Proof:
     """Compare functions with Pinocchio, and compute test vectors; raise VerificationError if they differ."""
-    tree = verifier.tree
-    checker = copy(verifier)  # the copy has a separate ledger
-    drawn = draw(tree, CHECKED, np.random.default_rng(0), with_special=True)
-    for function in functions:
-        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
-        call = Call(tree, plan_of, frame, reference, None, inputs)
-        found = function.evaluated((call.q, *call.rates))
-        checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
+    certificate = compared(verifier, plan_of, frame, reference, functions, Function.evaluated, verify)
     vectors, single = _vectors(verifier, plan_of, frame, reference, functions)
     return Proof(
         sha256=hashlib.sha256(verifier.text.encode()).hexdigest(),
         urdfkin=own_version(),
-        certificate=checker.certificate(),
+        certificate=certificate,
         vectors=vectors,
         single=single,
         lock=verifier.origin.lock,
     )
+
+
+def compared(
+    verifier: Verifier,
+    plan_of: Callable[[Sequence[int]], CompiledTree],
+    frame: str,
+    reference: Reference,
+    functions: Sequence[Function],
+    evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
+    verify: bool | None,
+) -> Certificate:
+    """Compare the results of `evaluate` with Pinocchio, or raise VerificationError."""
+    checker = copy(verifier)  # the copy has a separate ledger
+    drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
+    for function in functions:
+        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
+        call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
+        found = evaluate(function, (call.q, *call.rates))
+        checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
+    return checker.certificate()
 
 
 def _vectors(

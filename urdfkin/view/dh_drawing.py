@@ -41,7 +41,7 @@ def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) ->
         axes: Any = new_figure(10.0, 9.0).add_subplot()
         tip = frames[-1] @ table.tool
         points = np.concatenate(
-            [frames[:, :3, 3], _corners(table, frames), tip[None, :3, 3], np.zeros((1, 3))]
+            [frames[:, :3, 3], row_corners(table, frames), tip[None, :3, 3], np.zeros((1, 3))]
         )
         projection = _view(math.radians(_ELEVATION), math.radians(_AZIMUTH))
         canvas = _Canvas(axes, projection, max(float(np.ptp(points, axis=0).max()), 1e-3))
@@ -127,7 +127,7 @@ class _Canvas:
             self.axes.text(*spot, ", ".join(texts), parse_math=color in (_X, _Z), **words)
 
 
-def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
+def row_corners(table: DHTable, frames: FloatArray) -> FloatArray:
     """Return for each row of the table the point (n, 3) between the offset d and the length a."""
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
@@ -143,7 +143,7 @@ def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
 
 def _draw(canvas: _Canvas, table: DHTable, frames: FloatArray, tip: FloatArray) -> None:
     size, standard = canvas.size, table.convention is Convention.STANDARD
-    for i, (row, corner) in enumerate(zip(table.rows, _corners(table, frames), strict=True)):
+    for i, (row, corner) in enumerate(zip(table.rows, row_corners(table, frames), strict=True)):
         first, second = (_D, _A) if standard else (_A, _D)
         canvas.line(frames[i, :3, 3], corner, color=first, linewidth=2.6)
         canvas.line(corner, frames[i + 1, :3, 3], color=second, linewidth=2.6)

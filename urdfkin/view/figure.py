@@ -10,6 +10,7 @@ import importlib.util
 import io
 import re
 from functools import cache
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -127,7 +128,8 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
     text = re.sub(r"<!--.*?-->|\n\s*", lambda found: "\n" if found[0][0] == "\n" else "", text)
     head, _, body = text.partition(">")
     size = re.search(r'viewBox="[^"]*"', head)
-    labels = f"<title>{_escaped(title)}</title><desc>{_escaped(description)}</desc>"
+    words = (escape(printable(text), quote=False) for text in (title, description))
+    labels = "<title>{}</title><desc>{}</desc>".format(*words)
     return f'<svg class="plot" {size[0] if size else ""} role="img">{labels}{body}'
 
 
@@ -139,7 +141,3 @@ def _with_ids(text: str, prefix: str) -> str:
     )
     text = re.sub(r"url\(#", f"url(#{prefix}", text)
     return re.sub(r'xlink:href="#', f'href="#{prefix}', text)
-
-
-def _escaped(text: str) -> str:
-    return printable(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

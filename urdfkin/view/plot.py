@@ -51,37 +51,20 @@ def _look(k: int) -> dict[str, Any]:
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
-def position(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    _lines(axes, t, x.placement[:, :3, 3], ("x", "y", "z"))
-    axes.set_ylabel("position [m]")
+def _xyz(vector: Callable[[FrameMotion], FloatArray], label: str) -> Panel:
+    """Return the panel of a vector (n, 3)."""
+
+    def panel(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+        _lines(axes, t, vector(x), ("x", "y", "z"))
+        axes.set_ylabel(label)
+
+    return panel
 
 
-def orientation(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the frame's rotation since the start, in rad, as the rotation vector in world axes."""
+def _rotation(x: FrameMotion) -> FloatArray:
+    """Return the frame's rotation since the start as a rotation vector (n, 3) in world axes, in rad."""
     R = x.placement[:, :3, :3]
-    _lines(axes, t, log_rotation(R @ R[0].T), ("x", "y", "z"))
-    axes.set_ylabel("rotation [rad]")
-
-
-def velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    _lines(axes, t, x.velocity[:, :3], ("x", "y", "z"))
-    axes.set_ylabel("velocity [m/s]")
-
-
-def angular_velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    _lines(axes, t, x.velocity[:, 3:], ("x", "y", "z"))
-    axes.set_ylabel("angular velocity\n[rad/s]")
-
-
-def acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the classical linear acceleration, m/s^2."""
-    _lines(axes, t, x.acceleration[:, :3], ("x", "y", "z"))
-    axes.set_ylabel("acceleration [m/s²]")
-
-
-def angular_acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    _lines(axes, t, x.acceleration[:, 3:], ("x", "y", "z"))
-    axes.set_ylabel("ang. acceleration\n[rad/s²]")
+    return log_rotation(R @ R[0].T)
 
 
 def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
@@ -143,12 +126,12 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 #: All panels by name, in the order of the figure.
 PANELS: dict[str, Panel] = {
-    "position": position,
-    "orientation": orientation,
-    "velocity": velocity,
-    "angular-velocity": angular_velocity,
-    "acceleration": acceleration,
-    "angular-acceleration": angular_acceleration,
+    "position": _xyz(lambda x: x.placement[:, :3, 3], "position [m]"),
+    "orientation": _xyz(_rotation, "rotation [rad]"),
+    "velocity": _xyz(lambda x: x.velocity[:, :3], "velocity [m/s]"),
+    "angular-velocity": _xyz(lambda x: x.velocity[:, 3:], "angular velocity\n[rad/s]"),
+    "acceleration": _xyz(lambda x: x.acceleration[:, :3], "acceleration [m/s²]"),
+    "angular-acceleration": _xyz(lambda x: x.acceleration[:, 3:], "ang. acceleration\n[rad/s²]"),
     "parts": parts,
     "singular-values": partial(singular_values, rows=_LINEAR, unit="m/s"),
     "angular-singular-values": partial(singular_values, rows=_ANGULAR, unit="rad/s"),

@@ -44,7 +44,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.system.lazy_import import install_remedy
+from urdfkin.system.lazy_import import install_remedy, installed_version
 from urdfkin.system.locks import lock_over_forks
 
 
@@ -123,7 +123,8 @@ class RequestFilter:
         try:
             address = ip_address(name)
         except ValueError:
-            return name == "localhost" or (not self.is_local and name in {self.host.lower(), _own_name()})
+            own = {self.host.lower(), socket.gethostname().lower()}
+            return name == "localhost" or (not self.is_local and name in own)
         return address.is_loopback or not self.is_local
 
     @property
@@ -137,10 +138,6 @@ class RequestFilter:
     def address(self, port: int) -> str:
         name = "127.0.0.1" if self.host in ("", "0.0.0.0", "::") else self.host
         return f"http://{f'[{name}]' if ':' in name else name}:{port}/{self.key}/"
-
-
-def _own_name() -> str:
-    return socket.gethostname().lower()
 
 
 def policy(nonce: str, host: str) -> str:
@@ -187,7 +184,7 @@ class UnguardedError(UrdfkinError, RuntimeError):
     def __init__(self, what: str) -> None:
         super().__init__(
             f"the viewer cannot be secured: {what}",
-            where=f"viser {_version()}",
+            where=f"viser {installed_version('viser')}",
             remedy="pip install 'viser==1.1.1', which is secure, and report this error to urdfkin",
         )
 
@@ -369,9 +366,3 @@ def _test_the_filter(requests: RequestFilter, port: int) -> None:
             raise UnguardedError(f"{what} was not answered: {error}") from error
         finally:
             connection.close()
-
-
-def _version() -> str:
-    from importlib import metadata  # noqa: PLC0415  only an error needs this module
-
-    return metadata.version("viser")

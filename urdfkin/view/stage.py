@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.breakdown import KINDS
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors.escape import printable
 from urdfkin.kinematics.rotation import quaternion_of
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion
+from urdfkin.view.dh_drawing import row_corners
 from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
 #: Red, green and blue, from 0 to 255, of each part of the acceleration and of their sum.
@@ -355,10 +356,9 @@ class Stage:
         if table is None:
             return
         frames = T_world_base @ table.frames(q)
-        starts, corners, ends = _segments(table, q, frames)
-        parts = ((starts, corners, _OFFSET), (corners, ends, _NORMAL))
-        if str(table.convention) == "modified":
-            parts = ((starts, corners, _NORMAL), (corners, ends, _OFFSET))
+        starts, middles, ends = frames[:-1, :3, 3], row_corners(table, frames), frames[1:, :3, 3]
+        standard = table.convention is Convention.STANDARD
+        first, second = (_OFFSET, _NORMAL) if standard else (_NORMAL, _OFFSET)
         self._dh.append(
             self._scene.add_batched_axes(
                 "/dh/frames",
@@ -368,31 +368,14 @@ class Stage:
                 axes_radius=0.0035 * self.reach,
             )
         )
-        for k, (start, end, colour) in enumerate(parts):
+        for k, (start, end, colour) in enumerate(((starts, middles, first), (middles, ends, second))):
             if len(start):
+                points, thickness = np.stack([start, end], axis=1), 0.006 * self.reach
                 self._dh.append(
                     self._scene.add_line_segments(
-                        f"/dh/lines{k}",
-                        points=np.stack([start, end], axis=1),
-                        colors=colour,
-                        thickness=0.006 * self.reach,
+                        f"/dh/lines{k}", points=points, colors=colour, thickness=thickness
                     )
                 )
-
-
-def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the points between which a Denavit-Hartenberg table is drawn, as three arrays (rows, 3).
-
-    Each row of the table is drawn as two straight lines, which have the lengths d and a. The arrays contain
-    the starts of the first lines, the common points of both lines, and the ends of the second lines.
-    """
-    starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
-    if str(table.convention) == "standard":
-        # In the standard convention, d lies on the previous z axis, and then a lies on the new x axis.
-        a = np.array([row.a for row in table.rows]).reshape(-1, 1)
-        return starts, ends - a * frames[1:, :3, 0], ends
-    a = np.array([row.a for row in table.rows]).reshape(-1, 1)
-    return starts, starts + a * frames[:-1, :3, 0], ends
 
 
 def _towards(axis: FloatArray) -> FloatArray:

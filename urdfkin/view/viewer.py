@@ -10,6 +10,7 @@ import re
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -361,7 +362,7 @@ class Viewer:
         joints = gui.add_folder("Joints")
         with joints:
             self.units = gui.add_dropdown("angles", ("degrees", "radians"))
-        self.sliders = Sliders(gui, joints, coordinate_rows(robot), "", self._move)
+        self.sliders = Sliders(gui, joints, coordinate_rows(robot), "", partial(self._move, "q"))
         self.sliders.build(self.q, degrees=True)
         with joints:
             if fixed := fixed_coordinates(robot):
@@ -406,8 +407,10 @@ class Viewer:
             rest, random = gui.add_button("at rest"), gui.add_button("random")
             first = gui.add_folder("v, joint velocities", expand_by_default=True)
             second = gui.add_folder("a, joint accelerations", expand_by_default=False)
-        self.rates = Sliders(gui, first, rate_rows(robot, second=False), "/s", self._rate)
-        self.second_rates = Sliders(gui, second, rate_rows(robot, second=True), "/s²", self._second_rate)
+        self.rates = Sliders(gui, first, rate_rows(robot, second=False), "/s", partial(self._move, "v"))
+        self.second_rates = Sliders(
+            gui, second, rate_rows(robot, second=True), "/s²", partial(self._move, "a")
+        )
         for sliders, values in ((self.rates, self.v), (self.second_rates, self.a)):
             sliders.build(values, degrees=True)
         rest.on_click(lambda _: self.set_rates(np.zeros(robot.nv), np.zeros(robot.nv)))
@@ -417,23 +420,14 @@ class Viewer:
         tip = self.robot.tip_frame
         return tip if tip in self.robot.frame_names else self.robot.frame_names[-1]
 
-    def _move(self, at: int, value: float) -> None:
+    def _move(self, letter: str, at: int, value: float) -> None:
+        """Change one number of q, v or a."""
         with self._lock:
-            self.q = self.q.copy()
-            self.q[at] = value
-            self._write_q()
-            self.update()
-
-    def _rate(self, at: int, value: float) -> None:
-        with self._lock:
-            self.v = self.v.copy()
-            self.v[at] = value
-            self.update()
-
-    def _second_rate(self, at: int, value: float) -> None:
-        with self._lock:
-            self.a = self.a.copy()
-            self.a[at] = value
+            vector = getattr(self, letter).copy()
+            vector[at] = value
+            setattr(self, letter, vector)
+            if letter == "q":
+                self._write_q()
             self.update()
 
     def set_q(self, q: Given) -> None:
