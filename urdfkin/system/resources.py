@@ -13,23 +13,21 @@ from urdfkin.errors import SourceError
 
 @cache
 def robots_dir() -> Path:
-    """Return the folder `robots`, which is in the installed package or, in a checkout, beside the package."""
-    here = Path(__file__).resolve().parents[1]
-    for folder in (here / "robots", here.parent / "robots"):
-        if (folder / "catalogue.toml").is_file():
-            return folder
-    raise SourceError("urdfkin's own robots are missing", where=str(here), remedy="install urdfkin again")
+    return _file("own robots are", "urdfkin/robots/catalogue.toml", "robots/catalogue.toml").parent
 
 
 def questions_page() -> Path:
-    """Return the path of questions.md, which is in the installed package or, in a checkout, in `docs`."""
-    here = Path(__file__).resolve().parents[1]
-    for file in (here / "questions.md", here.parent / "docs" / "questions.md"):
-        if file.is_file():
-            return file
-    raise SourceError(
-        "urdfkin's page questions.md is missing", where=str(here), remedy="install urdfkin again"
-    )
+    return _file("page questions.md is", "urdfkin/questions.md", "docs/questions.md")
+
+
+def _file(what: str, *paths: str) -> Path:
+    """Return a file at its path in an installation or in a checkout, relative to the folder above the package."""
+    here = Path(__file__).resolve().parents[2]
+    if (file := next((path for path in map(here.joinpath, paths) if path.is_file()), None)) is None:
+        raise SourceError(
+            f"urdfkin's {what} missing", where=str(here / "urdfkin"), remedy="install urdfkin again"
+        )
+    return file
 
 
 @cache

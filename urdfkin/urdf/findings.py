@@ -78,17 +78,12 @@ class Excerpts:
         first = max(start - BEFORE, 0) if len(self.text) > SHOWN else 0
         last = first + SHOWN
         end = min(start + finding.width, last)
-        before, marked, behind = map(
-            _printable, (self.text[first:start], self.text[start:end], self.text[end:last])
-        )
+        pieces = self.text[first:start], self.text[start:end], self.text[end:last]
+        before, marked, behind = (printable(piece.replace("\t", _TAB)) for piece in pieces)
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
         caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(marked), 1)
         return f"{number} | {lead}{before}{marked}{behind}{tail}\n{' ' * len(number)} | {caret}"
-
-
-def _printable(text: str) -> str:
-    return printable(text.replace("\t", _TAB))
 
 
 def _cells(text: str) -> int:

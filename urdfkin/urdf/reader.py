@@ -39,7 +39,9 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
     """
     name = urdf.element.attributes.get("name", "")
     tree = build_tree(name, root_link(name, urdf.links, urdf.joints), joint_rows(urdf.joints, mimic=mimic))
-    return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
+    if root_joint not in (None, "floating", "planar"):
+        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(root_joint))
+    return tree if root_joint is None else with_root_joint(tree, JointKind(root_joint))
 
 
 def joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
@@ -59,12 +61,6 @@ def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) ->
             "a robot must have one root link", where=name, found=", ".join(sorted(roots)) or "none"
         )
     return roots.pop()
-
-
-def _root_kind(word: str) -> JointKind:
-    if word not in ("floating", "planar"):
-        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(word))
-    return JointKind(word)
 
 
 def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:

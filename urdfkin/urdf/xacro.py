@@ -14,7 +14,7 @@ import json
 import os
 import re
 import xml.etree.ElementTree as Xml
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from importlib.util import find_spec
 from math import ceil
@@ -38,12 +38,6 @@ Find = Callable[[str], str]
 _USED = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
 _FIND = re.compile(r"\$\(find\s+([^\s()]+)\s*\)")
 _COMPUTED = re.compile(r"\$[({]|[*?\[]")
-
-
-def check_arguments(path: Path, given: Iterable[str], known: Collection[str] | None) -> None:
-    """Raise UnknownNameError for an argument that is not among the known names (None: all are known)."""
-    if known is not None and (unknown := [name for name in given if name not in known]):
-        raise UnknownNameError("xacro argument", unknown[0], known, where=str(path))
 
 
 def arguments_of(path: Path, find: Find) -> set[str] | None:
@@ -132,8 +126,10 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError("the expanded URDF is too long", where=str(path), found=f"more than {MOST} bytes")
     answer = _answer(output)
     if "urdf" in answer:
-        takes = answer.get("takes")
-        check_arguments(path, arguments, [str(name) for name in takes] if isinstance(takes, list) else None)
+        if isinstance(takes := answer.get("takes"), list):
+            known = [str(name) for name in takes]
+            if unknown := [name for name in arguments if name not in known]:
+                raise UnknownNameError("xacro argument", unknown[0], known, where=str(path))
         return str(answer["urdf"]).encode()
     reason = answer.get("error") or f"the process of xacro ended with status {status}"
     raise XacroError(
@@ -148,20 +144,19 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
 
 
 def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes:
-    search = {name: _absolute(os.environ.get(name, "")) for name in VARIABLES}
-    installed = [entry for entries in search.values() for entry in entries.split(os.pathsep) if entry]
+    paths = {
+        name: [str(Path(one).absolute()) for one in os.environ.get(name, "").split(os.pathsep) if one]
+        for name in VARIABLES
+    }
+    installed = [entry for entries in paths.values() for entry in entries]
     request = {
         "path": str(path),
         "arguments": dict(arguments),
-        "search": search,
+        "search": {name: os.pathsep.join(entries) for name, entries in paths.items()},
         "ground": asdict(Ground.around(path, installed, list(arguments.values()))),
         "seconds": ceil(patience) + 1,
     }
     return json.dumps(request).encode()
-
-
-def _absolute(entries: str) -> str:
-    return os.pathsep.join(str(Path(entry).absolute()) for entry in entries.split(os.pathsep) if entry)
 
 
 def _answer(output: bytes) -> dict[str, Any]:
