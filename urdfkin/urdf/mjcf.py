@@ -365,7 +365,7 @@ def _align_note(body: str, *, whole: bool) -> Listed:
         return Listed("MuJoCo aligns this free body: its frame is its inertial frame", where)
     what = (
         "MuJoCo aligns the frame of this free body with its inertial frame, which depends on its shapes;"
-        " here the frame is the one in the file"
+        " urdfkin uses the frame in the file"
     )
     return Listed(what, where, moves=True)
 

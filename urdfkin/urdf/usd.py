@@ -1076,7 +1076,7 @@ class _Reader:
         rate = math.inf if not 0.0 < rate < _LARGEST else rate * (math.pi / 180.0 if turns else self._unit)
         if edge.kind is JointKind.CONTINUOUS:
             if math.isfinite(lower) or math.isfinite(upper):
-                what = "only a lower or only an upper limit; a URDF has both or none, so it has none"
+                what = "the joint has only one limit; a URDF has both limits or none, so it has none"
                 self._say("unused-in-usd", edge.path, what)
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))

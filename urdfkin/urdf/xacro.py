@@ -136,8 +136,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         "xacro cannot expand the file",
         where=str(path),
         found=str(reason).strip() or None,
-        remedy="give arguments with --xacro-arg NAME:=VALUE; packages are found by ROS_PACKAGE_PATH,"
-        " AMENT_PREFIX_PATH and, if they contain a package.xml, beside the folders above the file;"
+        remedy="set arguments with --xacro-arg NAME:=VALUE, and the folders of packages in ROS_PACKAGE_PATH;"
         " docs/xacro.md lists the operations that a file may do",
         question=Question.XACRO,
     )

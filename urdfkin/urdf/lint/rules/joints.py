@@ -467,8 +467,7 @@ class _MimicChecker:
         if joint.kind == "continuous":
             self.add(
                 MIMIC_CONTINUOUS,
-                "a continuous joint mimics another: Pinocchio itself accepts this for a continuous mimicked"
-                " joint only",
+                "a continuous joint mimics another: Pinocchio accepts this only if both are continuous",
                 mimic,
                 "joint",
                 'write type="revolute" for the mimic joint',
