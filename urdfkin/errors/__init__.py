@@ -18,10 +18,10 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: Number of leading characters of a name that `nearest` compares.
+#: `nearest` compares at most this number of leading characters of a name.
 _COMPARED = 128
 
-#: Default limit of `nearest` for one word, in compared pairs of characters.
+#: By default, `nearest` compares at most this number of pairs of characters for one word.
 #: A name that is rejected without a comparison does not count.
 WORK = 1_000_000
 #: Largest number of suggested names.

@@ -12,7 +12,7 @@ from html import escape
 
 from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_code, markdown_text, printable
 
-#: Characters that draw the branches of a tree before a name, and their replacements in ASCII.
+#: These characters draw the branches of a tree before a name. `ASCII` has their replacements.
 LINES = "├│└ "
 ASCII = str.maketrans("├│└", "+|`")
 #: A number below this fraction of a table's largest number is displayed as 0.

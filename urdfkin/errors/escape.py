@@ -13,12 +13,12 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-#: First characters that make a spreadsheet interpret a cell as a formula.
+#: A spreadsheet interprets a cell that begins with one of these characters as a formula.
 FORMULA = ("=", "+", "-", "@")
-#: A command of Azure or TeamCity to a CI service; such a command may be anywhere in a line.
+#: This pattern matches a command of Azure or TeamCity, which may be anywhere in a line.
 #: Group 1 is the character to escape. JSON and TOML parsers turn the escape back into the character.
 COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
-#: The same commands, and a command of GitHub, which is at the beginning of a line.
+#: A command of GitHub is at the beginning of a line.
 COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
 #: An invisible character (word joiner) keeps Markdown from making a link, a mention or an issue number.

@@ -11,13 +11,13 @@ import math
 import re
 from typing import NamedTuple
 
-#: The grammar of a decimal number. Matching takes time linear in the length of the text.
+#: Matching a decimal number takes time linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WHOLE = re.compile(r"[+-]?[0-9]+")
-#: Longest accepted number, in characters: Python converts long integers in quadratic time.
+#: A number has at most this number of characters: Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: Patterns of texts that are no numbers, each with a remedy. The first matching pattern counts.
+#: The first pattern that matches a text determines the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
@@ -58,7 +58,7 @@ def remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: The accepted names of units, each with the unit's short name.
+#: Each accepted name of a unit has a short name.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),

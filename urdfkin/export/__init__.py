@@ -11,7 +11,7 @@ from urdfkin.export.seal import seal
 if TYPE_CHECKING:
     from urdfkin.export.code import Code
 
-#: Module, suffix of files, and a summary in one line, for each language.
+#: Each language has a module, a suffix of files, and a summary in one line.
 LANGUAGES: dict[str, tuple[str, str, str]] = {
     "c": ("urdfkin.export.c", ".c", "C99, single or double precision, one configuration or a batch"),
     "cpp": ("urdfkin.export.cpp", ".hpp", "C++11, a header of templates for any number type"),
@@ -27,7 +27,7 @@ LANGUAGES: dict[str, tuple[str, str, str]] = {
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
     "latex": ("urdfkin.export.latex", ".tex", "LaTeX formulas in the textbook's symbols"),
 }
-#: Values of the argument `form` of `Robot.export`, with a short description.
+#: The argument `form` of `Robot.export` has these values.
 FORMS = {"tree": "the URDF's links", "dh": "its Denavit-Hartenberg table", "screws": "its screws"}
 #: Quantities that are exported by default.
 QUANTITIES = ("placement", "jacobian", "acceleration")

@@ -20,7 +20,7 @@ from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
 from urdfkin.system.processes import own_python
 
-#: Text that the first lines of every exported file contain.
+#: The first lines of every exported file contain this text.
 _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
@@ -31,11 +31,11 @@ _COMPILE = {
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: The command that compiles a CUDA file for the GPU.
+#: This command compiles a CUDA file for the GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that are searched for `_MARK` and for the word UNVERIFIED.
+#: `_MARK` and the word UNVERIFIED are searched in this number of characters.
 _HEAD = 2000
-#: Time limit of a command, seconds. The code of a robot with a thousand joints compiles in one minute.
+#: A command ends after this time (s). The code of a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 
 

@@ -21,7 +21,7 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
-#: Precedence of a sum, a change of sign, a product, and an operand that needs no brackets, lowest first.
+#: A sum has the lowest precedence, and an operand without brackets the highest.
 _SUM, _SIGN, _PRODUCT, _ATOM = range(4)
 _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 

@@ -42,7 +42,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: Options for the full width of vector registers. By default, GCC uses half of the width on many processors.
+#: By default, GCC uses half of the width of vector registers on many processors.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _names = count()
@@ -158,9 +158,9 @@ def _processor() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
+#: This number of random configurations, the neutral one and the limits are compared with Pinocchio.
 CHECKED = 100
-#: Largest number of results of one configuration, for eight configurations in half a megabyte of the stack.
+#: With at most this number of results, eight configurations need at most half a megabyte of the stack.
 _MOST_RESULTS = 8192
 # An index that is a plain integer is several times as fast as a member of an enumeration.
 _N, _OUT, _STAGE, *_PLACES = map(

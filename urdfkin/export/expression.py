@@ -88,7 +88,7 @@ class Graph:
         chapter: The textbook's equations as functions that record their equation numbers in new nodes.
     """
 
-    #: The constant that replaces expressions such as 0 x and x - x.
+    #: This constant replaces expressions such as 0 x and x - x.
     zero: float = 0.0
 
     def __init__(self) -> None:

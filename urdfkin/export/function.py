@@ -25,7 +25,7 @@ from urdfkin.verify.quantities import Quantity
 
 #: Letters of the inputs.
 INPUTS = ("q", "v", "a")
-#: Operations whose result the exported code always assigns to a variable.
+#: The exported code always assigns the result of these operations to a variable.
 _ALWAYS = ("sin", "cos", "sqrt", "/")
 #: Largest number of operations in a statement.
 _LONGEST = 12

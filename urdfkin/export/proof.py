@@ -40,7 +40,7 @@ from urdfkin.verify.exact.numbers import (
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.verifier import Verifier
 
-#: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
+#: This number of random configurations, the neutral one and the limits are compared with Pinocchio.
 CHECKED = 100
 #: Number of test vectors.
 VECTORS = 4

@@ -207,7 +207,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-#: The function that computes each quantity, by the quantity's name.
+#: Each quantity has a function that computes it.
 QUANTITIES: dict[str, Callable[[CompiledTree, Kind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,

@@ -10,7 +10,7 @@ import hashlib
 import re
 
 _ZEROS = "0" * 64
-#: The header's line for the digest, in which `seal` replaces the zeros.
+#: `seal` replaces the zeros in this line of the header by the digest.
 SEAL = f"Seal sha256 {_ZEROS}"
 _LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 

@@ -24,9 +24,9 @@ from urdfkin.kinematics.roundings import (
 )
 from urdfkin.model.tree import FloatArray
 
-#: Number of results whose derivatives are computed in one backward pass, which limits the memory.
+#: One backward pass computes the derivatives of at most this number of results, which limits the memory.
 _TOGETHER = 512
-#: Derivatives of the value of each operation with respect to its operands.
+#: Each operation has the derivatives of its value with respect to its operands.
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
     "+": lambda value, x, y: (1.0, 1.0),
     "-": lambda value, x, y: (1.0, -1.0),

@@ -33,7 +33,7 @@ from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
-#: User ids that may own the parent folders: root, and the host's root user in some containers.
+#: Root, and the host's root user in some containers, may own the parent folders.
 _TRUSTED = (0, 65534)
 
 

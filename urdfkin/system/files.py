@@ -44,11 +44,11 @@ def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
     return b"".join([*parts, data[cursor:]])
 
 
-#: Seconds to wait for a process to open the other end of a named pipe.
+#: urdfkin waits this time (s) for a process that opens the other end of a named pipe.
 PATIENCE = 10.0
-#: Largest size in bytes of a robot, a table, a settings file or a cached file.
+#: A robot, a table, a settings file or a cached file has at most this size in bytes.
 MOST = 100_000_000
-#: Largest size in bytes of data: trajectories, samples, reports.
+#: Data (trajectories, samples, reports) have at most this size in bytes.
 MOST_DATA = 2_000_000_000
 _AT_A_TIME = 2**20
 _KINDS = {

@@ -56,7 +56,7 @@ def installed_version(package: str) -> str | None:
         return None
 
 
-#: The extras for users in pyproject.toml, with the requirement that each extra adds.
+#: Each extra for users in pyproject.toml adds this requirement.
 EXTRAS = {
     "xacro": "xacrodoc>=2",
     "plots": "matplotlib>=3.10.7",

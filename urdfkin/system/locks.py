@@ -11,7 +11,7 @@ import os
 import threading
 
 _locks: list[threading.RLock] = []
-#: The locks that each forking thread acquired before the fork, by thread identifier.
+#: Each forking thread, by its identifier, has the locks that it acquired before the fork.
 _acquired: dict[int, list[threading.RLock]] = {}
 
 

@@ -17,9 +17,9 @@ from typing import TypeVar
 
 from urdfkin.system.locks import lock_over_forks
 
-#: Environment variables that a Python interpreter may need to start.
+#: A Python interpreter may need these environment variables to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
-#: Limits linear algebra to one thread: a confined process has little address space for threads.
+#: Linear algebra uses one thread, because a confined process has little address space for threads.
 _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 

@@ -126,7 +126,7 @@ VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _NAME = re.compile(rb"<name>([^<]*)</name>")
 
-#: URI schemes that name a package and a path inside it.
+#: A URI with one of these schemes names a package and a path inside it.
 SCHEMES = ("package://", "model://")
 
 

@@ -23,9 +23,9 @@ from urdfkin.urdf.expressions import RefusedError
 #: Memory limit in bytes. The interpreter and its libraries need about a tenth of this memory.
 MEMORY = 2 * 1024**3
 
-#: Audit events that are allowed without a check.
+#: These audit events are allowed without a check.
 _HARMLESS = {"builtins.id", "compile", "glob.glob", "glob.glob/2", "object.__getattr__", "sys._getframe"}
-#: Audit events that are allowed only for files that the process may read.
+#: These audit events are allowed only for files that the process may read.
 _READING = {"open", "os.listdir", "os.scandir"}
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 

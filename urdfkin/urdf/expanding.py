@@ -19,7 +19,7 @@ from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import arguments_of
 
-#: Functions of xacro that would give an expression access to types and attributes.
+#: These functions of xacro would give an expression access to types and attributes.
 _NEVER = ("type", "vars")
 
 #: xacro's own function evaluates this expression; urdfkin's function refuses it.

@@ -33,7 +33,7 @@ from urdfkin.errors.escape import log_line, printable
 from urdfkin.system.files import Edit, edited
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_LIMITS, START_TAG, Element, Limits
 
-#: Longest quotation from a file in a message, in characters.
+#: A message quotes at most this number of characters of a file.
 QUOTED = 60
 
 
@@ -93,7 +93,7 @@ def _cells(text: str) -> int:
     )
 
 
-#: Bound (rad) on the error when an angle of at most one revolution is rounded to a double.
+#: Rounding an angle of at most one revolution to a double has at most this error (rad).
 ROUNDING = 2.0**-50
 
 
@@ -310,7 +310,7 @@ class UrdfError(UrdfkinError, ValueError):
     URDF402
     """
 
-    #: Number of errors that the message lists; it counts the others.
+    #: The message lists at most this number of errors, and counts the others.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -363,7 +363,7 @@ class Rule:
     oracle: PinocchioReading | None = None
 
 
-#: The first word, after any spaces, of a comment with an instruction for urdfkin.
+#: A comment with an instruction for urdfkin begins with this word, after any spaces.
 MARK = "urdfkin:"
 
 
@@ -394,7 +394,7 @@ class Silence:
     used: set[str] = field(default_factory=set)
 
 
-#: The first comment that silences a code, by code.
+#: Each code has the first comment that silences it.
 Codes = dict[str, Silence]
 
 
@@ -444,18 +444,18 @@ class Silences:
         return silence.reason
 
 
-#: `SEARCHES`: number of misspelt names in a file for which urdfkin searches the correct spelling.
-#: `CANDIDATES`: number of known names in each search. `WORK`: the argument `work` of `nearest`.
+#: urdfkin searches the correct spelling of at most `SEARCHES` misspelt names in a file.
+#: Each search compares at most `CANDIDATES` known names; `WORK` is the argument `work` of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
 #: `FOLDED` or more warnings (or notes) with one code become one finding.
-#: `FOLDED_EXTRAS` replaces `FOLDED` for URDF7xx: content that kinematics does not use.
+#: For the codes URDF7xx (content that kinematics does not use), `FOLDED_EXTRAS` findings are enough.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: Number of errors with one code that are reported separately; the last one lists the lines of the others.
+#: At most this number of errors with one code is reported separately; the last lists the other lines.
 ERRORS_SHOWN = 100
 
-#: Number of stored findings with one code. Of each further finding, only the line number is stored.
+#: At most this number of findings with one code is stored; of further ones, only the line numbers.
 WRITTEN_OUT = 10_000
 
 
@@ -687,8 +687,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Pattern of an attribute value with a tab, a line end or a reference such as `&amp;`.
-#: An XML parser replaces these characters. Possessive quantifiers keep the matching time linear.
+#: An XML parser replaces tabs, line ends and references such as `&amp;` in a value.
+#: Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 NEWLINE = re.compile(rb"\r\n|\r|\n")

@@ -143,7 +143,7 @@ def _text(root: Any) -> str:
 
 
 _ROOT = "universe"
-#: Class names of joints whose axis is the x, y or z axis of the joint frame.
+#: The axis of a joint of these classes is the x, y or z axis of the joint frame.
 #: R is a revolute joint, RUB a revolute joint without limits, and P a prismatic joint.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
@@ -156,7 +156,7 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: Limits above this number are missing limits: Pinocchio stores the largest double for them.
+#: A limit above this number is missing: Pinocchio stores the largest double for it.
 _ENDLESS = 1e300
 
 

@@ -44,12 +44,12 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
-#: Position limit, +- m, of a slide joint without limits. A prismatic joint of a URDF needs limits.
+#: A slide joint without limits gets these limits (+- m), because a prismatic joint of a URDF needs limits.
 UNBOUNDED = 1000.0
-#: Pattern of the beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
+#: An MJCF text begins with this pattern. Possessive quantifiers keep the matching time linear.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _ENDINGS = (".xml", ".mjcf")
-#: Bytes of a file that are read to recognize MJCF.
+#: This number of bytes of a file is read to recognize MJCF.
 _HEAD = 65_536
 
 

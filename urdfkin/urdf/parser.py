@@ -65,14 +65,14 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "UTF-16"),
 )
 
-#: The bytes of '<', with which an XML file in UTF-32 or UTF-16 begins without a byte order mark.
+#: An XML file in UTF-32 or UTF-16 without a byte order mark begins with these bytes of '<'.
 _WIDE = ((b"<\0\0\0", "UTF-32"), (b"\0\0\0<", "UTF-32"), (b"<\0", "UTF-16"), (b"\0<", "UTF-16"))
 
 _DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
 _ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
 _XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
 
-#: Encodings in which ASCII characters have the same bytes as in UTF-8.
+#: In these encodings, ASCII characters have the same bytes as in UTF-8.
 _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
@@ -187,14 +187,14 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Largest depth of nested elements in older versions of libxml2.
+#: Older versions of libxml2 accept at most this depth of nested elements.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
 #: Bytes per call of the parser.
 _PIECE = 1_000_000
 
-#: Number of stored characters of an element's text. A message quotes fewer.
+#: The parser stores at most this number of characters of an element's text. A message quotes fewer.
 _STORED = 2 * QUOTED
 
 #: Attributes whose value is the name of a link or joint.
@@ -439,7 +439,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: A clearer message and a remedy for each message of expat.
+#: Each message of expat has a clearer message and a remedy here.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -469,7 +469,7 @@ WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
 UNDERFLOW = Rule("URDF304", "underflow", WARNING)
 NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
 
-#: White space between numbers. Splitting at this pattern takes time linear in the length of the text.
+#: Splitting at this white space takes time linear in the length of the text.
 _BLANKS = re.compile(r"[ \t\r\n]+")
 
 
@@ -586,7 +586,7 @@ class NumberReader:
     def _report_refused(self, element: Element, attribute: str, what: str) -> None:
         needed = self.bad_number is BAD_NUMBER
         self.report.add(
-            # urdfdom accepts a file with such a number if kinematics does not use the number.
+            # urdfdom accepts a file with a wrong number that kinematics does not use.
             WHITESPACE if needed else self.bad_number,
             f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
             element,
@@ -601,13 +601,13 @@ class NumberReader:
 
 _NOT_ZERO = "123456789"
 
-#: Elements whose tag messages omit.
+#: Messages omit the tags of these elements.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Leading zeros of a character reference. Python cannot convert a number with thousands of zeros.
+#: Python cannot convert a character reference with thousands of leading zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
-#: Patterns of invalid numbers, each with a remedy. The first matching pattern counts.
+#: The first pattern that matches an invalid number determines the remedy.
 _REMEDIES = (
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*\$[({].*", "expand the xacro first"),
@@ -651,7 +651,7 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: Shortest and longest length whose square neither underflows nor overflows.
+#: The square of a length between these numbers neither underflows nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150
 
 
@@ -931,7 +931,7 @@ def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 
-#: Longer words cannot be similar to a tag or attribute name of URDF.
+#: A longer word cannot be similar to a tag or an attribute of URDF.
 _LONGEST_WORD = 32
 
 

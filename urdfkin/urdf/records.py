@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Largest number of nested elements that Pinocchio accepts.
+#: Pinocchio accepts at most this number of nested elements.
 #: Pinocchio's XML parser, tinyxml2, refuses level 500 and counts the document itself as level 1.
 ORACLE_DEPTH = 498
 
@@ -41,7 +41,7 @@ class Limits:
 DEFAULT_LIMITS = Limits()
 
 
-#: Pattern of a start tag, to be matched at an element's offset. A quoted value may contain '>'.
+#: This pattern matches a start tag at an element's offset. A quoted value may contain '>'.
 START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
 ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 
@@ -109,7 +109,7 @@ class Element:
 
 Vector = tuple[float, ...]
 
-#: Attributes of `<limit>` that URDF defines from version 1.2 on.
+#: URDF defines these attributes of `<limit>` from version 1.2 on.
 FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
 #: Joint types with an axis.

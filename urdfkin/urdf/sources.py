@@ -259,7 +259,7 @@ def _in_package(name: str, path: str) -> Path:
 
 def _encode(content: str | bytes, label: str, source: str) -> Text:
     # A Python string may contain a lone surrogate, which UTF-8 does not allow.
-    # "surrogatepass" leaves the surrogate to the checks of the bytes, which report it.
+    # With "surrogatepass", the checks of the bytes report the surrogate.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return Text(data, label, source)
 

@@ -55,7 +55,7 @@ from urdfkin.urdf.sources import USD
 _LAYERS = 1_000
 #: Largest number in single precision. A USD file contains this number or infinity if a joint has no limit.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Largest cosine between two axes of a frame without shear, as a multiple of u n.
+#: The cosine between two axes of a frame without shear is at most this number times u n.
 #: n is the number of prims on the path to the frame's prim.
 #: u is the largest relative error of rounding to single precision.
 #: Each entry of a stored rotation matrix has an error of u.
@@ -63,26 +63,26 @@ _LARGEST = float(np.finfo(np.float32).max)
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
 #: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: Largest limit of a joint that hardly moves, whether the limit is in degrees or radians.
+#: A joint with smaller limits hardly moves, whether the limits are in degrees or radians.
 _SMALLEST_ANGLE = 0.01
 _NONE = (-math.inf, math.inf)
-#: First bytes of a file that Git LFS has not fetched.
+#: A file that Git LFS has not fetched begins with these bytes.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Relationships to the mimicked joint. The group is the direction in the name of PhysX's schema.
+#: These relationships name the mimicked joint. The group is the direction in the name of PhysX's schema.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
-#: Words in the names of types and applied schemas that couple joints or bodies.
+#: A type or applied schema with one of these words in its name couples joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
-#: Endings of the type names of joints that a tree cannot represent.
+#: A tree cannot represent joints whose type names end with these words.
 #: OpenUSD recognizes such a joint only if the plugin that defines the type is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Coefficients of a MuJoCo joint equality that a mimic rule, which is linear, cannot contain.
+#: A mimic rule is linear, so it cannot contain these coefficients of a MuJoCo joint equality.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
-#: Names of Xforms that contain the shapes of a body.
+#: Xforms with these names contain the shapes of a body.
 _SHAPES = ("visual", "visuals", "collision", "collisions")
-#: Rotation matrix that turns the up axis y to z.
+#: This rotation matrix turns the up axis y to z.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 #: The kinds of remarks. `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
@@ -586,7 +586,7 @@ class _Reader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._say("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # The name may be "physxMimicJoint:rotX:referenceJoint", with any direction.
+            # The direction in "physxMimicJoint:rotX:referenceJoint" may be another one.
             own = _MIMIC_RULE.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"

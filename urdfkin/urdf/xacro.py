@@ -29,10 +29,10 @@ from urdfkin.urdf.catalogue import VARIABLES
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError
 
-#: Largest size of one file in bytes, and largest number of files, in the search for declared arguments.
+#: The search for declared arguments reads files of at most this size, and at most this number of files.
 MOST_ARGUMENTS, MOST_FILES = 10_000_000, 200
 
-#: Returns the folder of a package, or raises LookupError.
+#: The function returns the folder of a package, or raises LookupError.
 Find = Callable[[str], str]
 
 _USED = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
@@ -88,7 +88,7 @@ def _included_file(name: str, beside: Path, find: Find) -> Path | None:
     return None if _COMPUTED.search(name) or not name else folder / name
 
 
-#: Time limit of an expansion in seconds, because a macro may call itself without end.
+#: An expansion ends after this time in seconds, because a macro may call itself without end.
 PATIENCE = 60.0
 
 #: Size limit of the answer in bytes.

@@ -23,7 +23,7 @@ from urdfkin.view.figure import BLUE, ORANGE, VERMILION, label, new_figure, styl
 
 _X, _Z, _D, _A, _AXIS, _TEXT = VERMILION, BLUE, "#6b7280", ORANGE, "#9aa7b5", "#222222"
 
-#: View direction in degrees: elevation above the base's x-y plane, and azimuth about its z axis.
+#: The view has an elevation above the base's x-y plane and an azimuth about its z axis, in degrees.
 _ELEVATION, _AZIMUTH = 20.0, -55.0
 
 

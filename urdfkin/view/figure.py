@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Axes = matplotlib.axes.Axes
     Figure = matplotlib.figure.Figure
 
-#: Colours of the page's style that replace placeholder colours in a drawing.
+#: The colours of the page's style replace placeholder colours in a drawing.
 PAGE_COLOURS = {
     "#010101": "var(--plot-text)",
     "#020202": "var(--plot-grid)",
@@ -37,12 +37,12 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours, distinguishable with every colour vision deficiency.
+#: Okabe and Ito's colours are distinguishable with every colour vision deficiency.
 #: Lines with different colours also differ in line style, sign or position.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: Colour of a number that is wrong or outside its limits; a cross always marks such a number as well.
+#: A number with this colour is wrong or outside its limits; a cross also marks such a number.
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {

@@ -21,8 +21,8 @@ from urdfkin.robot.trajectory import Trajectory
 from urdfkin.view.plot import foot
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-#: Largest number of updates per second while playing.
-#: The other numbers of a saved motion are frames per second, most frames, and the size in pixels.
+#: While playing, the viewer makes at most this number of updates per second.
+#: A saved motion has this frame rate (1/s), this largest number of frames, and this size in pixels.
 _RATE, _FRAME_RATE, _MOST_FRAMES, _SIZE = 20.0, 12.5, 250, (640, 480)
 
 

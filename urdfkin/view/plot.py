@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: A function that draws a motion over time, in seconds, into axes.
+#: A panel draws a motion over time, in seconds, into axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Line styles that distinguish lines without colours.
+#: Line styles distinguish lines without colours.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
-#: Largest number of names in a legend, and the colour of lines without a name.
+#: A legend has at most this number of names. Lines without a name have one colour.
 _MOST_NAMES, _UNNAMED = 14, "#9AA7B5"
 
 
@@ -140,7 +140,7 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: Text after "rad" or "m" in the unit of q, v or a.
+#: The unit of q, v or a has this text after "rad" or "m".
 _PER = {"q": "", "v": "/s", "a": "/s²"}
 #: Names of the panels of coordinates. Each panel has one plot for each unit.
 COORDINATES = tuple(_PER)
@@ -214,13 +214,14 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
     return -largest, largest
 
 
-#: Largest size of a figure in inches: a page of A4 or US Letter with a margin.
+#: A figure (inches) fits on a page of A4 or US Letter with a margin.
 _PAGE = (7.6, 10.4)
-#: Height of a panel, and of title and footer together, in inches.
+#: A panel, and the title with the footer, have these heights in inches.
 _HEIGHT, _WORDS = 2.1, 0.9
-#: Letters per inch in the footer and in a legend, and the width of a legend's sample line in letters.
+#: One inch has this number of letters in the footer and in a legend.
+#: The sample line in a legend is as wide as `_HANDLE` letters.
 _LETTERS, _LETTERS_OF_LEGEND, _HANDLE = 16, 22, 8
-#: Sentence in the footer if v and a may not be the exact derivatives of q.
+#: The footer has this sentence if v and a may not be the exact derivatives of q.
 _RATES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
 )

@@ -25,7 +25,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: Largest size of a mesh, material or texture file in bytes; larger files are not shown.
+#: A mesh, material or texture file with more bytes is not shown.
 LARGEST_FILE = 200_000_000
 
 

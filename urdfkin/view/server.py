@@ -168,12 +168,12 @@ LOOPBACK = "127.0.0.1"
 #: The only message that the server itself accepts from a page reports that a control has changed.
 #: Each connection handles the messages about its camera.
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Replacements that add the nonce to the first script of viser's page, and to the script that it creates.
+#: The first script of viser's page, and the script that it creates, get the nonce by these replacements.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
-#: The start of the page's head, after which urdfkin's script is added.
+#: urdfkin's script is added after this start of the page's head.
 _HEAD = '<meta charset="utf-8" />'
 _swapping = lock_over_forks()
 

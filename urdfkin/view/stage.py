@@ -24,7 +24,7 @@ from urdfkin.robot.frame_motion import FrameMotion
 from urdfkin.view.dh_drawing import row_corners
 from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
-#: Red, green and blue, from 0 to 255, of each part of the acceleration and of their sum.
+#: Each part of the acceleration has a colour: red, green and blue from 0 to 255.
 PART_COLOURS = {
     "transverse": (0, 114, 178),
     "centripetal": (213, 94, 0),
@@ -33,7 +33,7 @@ PART_COLOURS = {
     "sum": (30, 30, 30),
 }
 LINEAR, ANGULAR = (0, 114, 178), (204, 121, 167)
-#: Length of the longest arrow as a fraction of the robot's reach.
+#: The longest arrow has this fraction of the robot's reach.
 _SHARE = 0.3
 
 
@@ -112,9 +112,9 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Longest time (s) between the opening of a page and its final layout.
+#: A page has its final layout at most this time (s) after its opening.
 _OPENING = 15.0
-#: Direction from the robot to the camera, and the fraction of the view that the robot fills.
+#: `_FROM` is the direction from the robot to the camera. The robot fills this fraction of the view.
 #: `_FOV` is viser's vertical field of view (rad).
 _FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
 

@@ -43,13 +43,13 @@ from urdfkin.view.stage import (
 
 #: A joint with a larger range than this counts as unlimited, like a wheel.
 _FAR = 100.0
-#: Change of an angle by an arrow key, in degrees and in radians, and the steps of other sliders.
-#: A step is rounded down to 1, 2 or 5 times a power of ten.
+#: An arrow key changes an angle by this number of degrees or radians.
+#: Other sliders have at least `_STEPS` steps of 1, 2 or 5 times a power of ten.
 _DEGREES, _RADIANS, _STEPS = 1.0, 0.01, 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Default ranges of joint velocities (rad/s or m/s) and joint accelerations (rad/s^2 or m/s^2).
+#: By default, joint velocities (rad/s, m/s) and accelerations (rad/s^2, m/s^2) have these ranges.
 _RATE, _SECOND_RATE = 3.0, 5.0
-#: Largest number of missing meshes that a message names.
+#: A message names at most this number of missing meshes.
 _MOST_MISSING = 5
 
 

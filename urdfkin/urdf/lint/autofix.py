@@ -32,11 +32,11 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Largest number of passes over a file.
-#: One pass applies the fixes of one code. If two fixes overlap, the second fix needs another pass.
+#: `--fix` makes at most this number of passes over a file, because one pass applies the fixes of one code.
+#: If two fixes overlap, the second fix needs another pass.
 PASSES = 100
 
-#: Bound (rad) on the rotation when three numbers of a unit vector are rounded to doubles: twice 2**-53.
+#: Rounding the numbers of a unit vector to doubles rotates it by at most twice 2**-53 rad.
 TILT = Fraction(1, 2**52)
 
 
@@ -86,7 +86,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
     """Yield the reasons why a fix must not be applied."""
     code = fixable[0].code
     # The reporter stores a limited number of findings with one code.
-    # If a file has more, a fix would let the reporter store another one, which would look new.
+    # After a fix, the reporter can store another of these findings, which would look new.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -135,7 +135,7 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor on `Fix.turns` for the rounding errors of this sum of doubles.
+#: This factor allows for the rounding errors of `Fix.turns`, which is a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 

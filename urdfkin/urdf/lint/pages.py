@@ -37,7 +37,7 @@ RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda r
 #: The rules about MJCF and USD files by code.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: The code of each rule by its names in lower case: the code, its digits, and the short name.
+#: The names of a rule are its code, the digits of the code, and its short name, in lower case.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
@@ -131,7 +131,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     return family if family and prefix.lstrip(string.ascii_uppercase) else (find_rule(word),)
 
 
-#: Largest number of characters in a line of an example.
+#: Longer lines of an example are cut.
 _WIDEST = 100
 #: Width of prose on a terminal, in characters.
 WIDTH = 88

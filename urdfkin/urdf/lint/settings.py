@@ -137,7 +137,7 @@ _WORDS = {
     str: "a string",
 }
 
-#: Patterns of robot files in a folder. Most files with the suffix .xacro contain only a part of a robot.
+#: Robot files in a folder match these patterns. Most .xacro files contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
@@ -251,7 +251,7 @@ def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
     )
 
 
-#: Suffixes of the files that a xacro file can include.
+#: A xacro file can include files with these suffixes.
 _PARTS = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 
@@ -318,7 +318,7 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     return Baseline(Counter(key_of(finding, relative(finding.file, Path())) for finding in found))
 
 
-#: Files that make ROS's build tools, and urdfkin, skip a folder.
+#: ROS's build tools and urdfkin skip a folder that contains one of these files.
 LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 

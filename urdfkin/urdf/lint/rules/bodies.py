@@ -18,17 +18,17 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Largest plausible mass (kg), and largest plausible distance of the centre of mass from the origin (m).
+#: A larger mass (kg) or distance of the centre of mass from the origin (m) is reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: Mass (kg) of a body below which its moments of inertia are not checked. It is probably a placeholder.
+#: A smaller mass (kg) is probably a placeholder: its moments of inertia are not checked.
 NEGLIGIBLE = 1e-3
 
 #: Moments of inertia per kg (m^2) below this number count as rounding errors.
 #: Only bodies smaller than about 0.03 mm have such small moments.
 ROUNDING = 1e-9
 
-#: Allowed relative rounding error of moments of inertia, which is large because exporters write few digits.
+#: Moments of inertia have relative rounding errors of this size, because exporters write few digits.
 _WRITTEN = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -153,7 +153,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: Numeric attributes of each shape: name, count of numbers, and whether the attribute is required.
+#: A numeric attribute of a shape has a name and a count of numbers, and may be required.
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),

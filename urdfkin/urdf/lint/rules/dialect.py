@@ -36,7 +36,7 @@ NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
 _T = TypeVar("_T")
 
-#: Elements of an SRDF, which accompanies a URDF.
+#: An SRDF, which accompanies a URDF, has these elements.
 _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_collisions", "passive_joint"}
 
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
@@ -182,10 +182,10 @@ UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
 DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
-#: Extension elements with any content, even `<joint>` and `<link>`.
+#: Extension elements may have any content, even `<joint>` and `<link>`.
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
 
-#: Elements and attributes that simulators and vendors add in widely used robots.
+#: Simulators and vendors add these elements and attributes in widely used robots.
 _ADDED = (
     "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
     " mu_coulomb mu_viscous current command_effort gear_velocity"
@@ -220,22 +220,22 @@ ATTRIBUTES = {
     if colon
 }
 
-#: Elements and attributes of other formats for poses, which URDF readers skip.
+#: URDF readers skip these elements and attributes for poses in other formats.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Attributes of other elements or formats, which `--fix` does not remove.
+#: `--fix` does not remove these attributes of other elements or formats.
 _MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
-#: Child elements that may occur only once, by element.
+#: These child elements may occur only once in an element.
 _ONCE = {
     **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
 }
 
-#: Elements that have their values in attributes. Readers ignore text between their tags.
+#: Readers ignore text between the tags of these elements.
 _VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
 
-#: Elements in which any text between the tags is a value that belongs in an attribute.
+#: Text between the tags of these elements is a value that belongs in an attribute.
 _VECTORS = ("origin", "axis")
 
 
@@ -393,7 +393,7 @@ UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 #: Prefixes that XML declares itself.
 _PREDECLARED = ("xml", "xmlns")
 
-#: Beginnings of names that other rules (URDF202 and URDF112) report.
+#: Other rules (URDF202 and URDF112) report names that begin with these words.
 _REPORTED = ("xacro:", "xi:include")
 
 
@@ -455,7 +455,7 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Longest name, in characters, that is not reported. Longer names break tables and file paths.
+#: A name with more characters is reported, because it breaks tables and file paths.
 LONGEST = 200
 
 

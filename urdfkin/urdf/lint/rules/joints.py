@@ -142,7 +142,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
         return False  # another finding reports the joint with a wrong child
     parents = {joint.parent for joint in robot.joints}
     # The root of the robot is the first link with children and without a parent.
-    # No joint connects the other links without a parent with this root.
+    # The other links without a parent are not connected with this root.
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
@@ -165,10 +165,10 @@ NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 #: Axes that are written with few digits have differences of this size.
 LENGTH_ROUNDING = 2e-4
 
-#: Largest difference between 1 and the length of a unit vector. `kinematics.inputs` has the same tolerance.
+#: The length of a unit vector differs from 1 by at most this number, as in `kinematics.inputs`.
 _ONE = 1e-12
 
-#: The largest x or y component of a z axis, as a fraction of its z component.
+#: A z axis has x and y components below this fraction of its z component.
 _LEAN = 1e-9
 
 #: Pinocchio replaces an axis by a coordinate axis within this relative tolerance.
@@ -306,7 +306,7 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # urdfdom then has the same rules for all joint types
+    strict = version >= (1, 2)  # from URDF 1.2 on, urdfdom has the same rules for all joint types
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -372,9 +372,9 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: Largest plausible multiplier and offset (rad or m) of a mimic joint. Larger values are reported.
+#: A larger multiplier or offset (rad or m) of a mimic joint is reported.
 LARGEST = 1e6
-#: Largest unusable fraction of a mimicked joint's range that is not reported.
+#: A smaller unusable fraction of a mimicked joint's range is not reported.
 #: Limits of mimic joints are often written with few digits.
 LEAST_LOST = 1e-3
 
@@ -579,7 +579,7 @@ NOTICEABLE = 1e-3
 #: An angle that differs from a multiple of pi by less than this angle (rad) is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi, divided by pi, and the least number of decimals of a rounded number that is reported.
+#: A rounded multiple of pi is recognized only with at least this number of decimals.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]

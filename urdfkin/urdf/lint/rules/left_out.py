@@ -39,15 +39,15 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: Bytes of a file in which elements are searched.
+#: Elements are searched in this number of bytes.
 _SEARCHED = 10_000_000
-#: The end of each kind of XML that is not an element, by its beginning.
+#: XML that is not an element has these beginnings and ends.
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Tags of MJCF elements whose findings have no name, and the tags in these findings.
+#: Findings about these MJCF elements have a tag without a name.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: A prim in the text form of USD, or the beginning of a comment, string, asset, array or scope, or its end.
+#: This pattern matches a prim in the text form of USD, and the ends of other content.
 _USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
-#: The end of each part of USD without prims, by its beginning.
+#: Parts of USD without prims have these beginnings and ends.
 _NO_PRIM = {
     b"#": re.compile(rb"[\r\n]"),
     b"[": re.compile(rb"\]"),
@@ -55,7 +55,7 @@ _NO_PRIM = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: Line and column, from 1, and width of an element, by element and name.
+#: An element, by tag and name, has a line and a column, from 1, and a width.
 _Places = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
