@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 from numbers import Real
+from operator import index
 from typing import Any, TypeGuard
 
 from urdfkin.errors import InputError
@@ -19,17 +20,10 @@ def whole_number(value: object, name: str, least: int, most: float = math.inf) -
     Traceback (most recent call last):
     urdfkin.errors.InputError: threads must be a whole number, at least 1: found True
     """
-    if type(value) is int:
-        number = value
-    elif isinstance(value, bool) or not hasattr(type(value), "__index__"):
-        raise InputError(f"{name} must be a whole number, at least {least}", found=safe_repr(value))
-    else:
-        try:
-            number = value.__index__()  # type: ignore[attr-defined]
-        except TypeError:  # `__index__` of a NumPy array raises TypeError
-            raise InputError(
-                f"{name} must be a whole number, at least {least}", found=safe_repr(value)
-            ) from None
+    try:
+        number = index(None if isinstance(value, bool) else value)  # type: ignore[arg-type]
+    except TypeError:
+        raise InputError(f"{name} must be a whole number, at least {least}", found=safe_repr(value)) from None
     if not least <= number <= most:
         beyond = f"{name} must be at most {most}" if number > most else f"{name} must be at least {least}"
         raise InputError(beyond, found=safe_repr(value))
