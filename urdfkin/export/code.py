@@ -140,7 +140,7 @@ def code_of(
     code = replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
 
     def exact() -> Code:
-        from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only computer algebra needs this module
+        from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only one language needs this
 
         functions, vouched = exact_functions(
             verifier, plan_of, frame, reference, code.functions, proof, verify

@@ -63,7 +63,8 @@ class Ground:
         if os.path.basename(real) == "package.xml":  # noqa: PTH119  `real` is a string
             return True
         roots = self.roots
-        if any(_lies_in(root, os.path.abspath(path)) for root in self.installed):  # noqa: PTH100  resolve() follows links
+        as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
+        if any(_lies_in(root, as_written) for root in self.installed):
             roots = [*roots, *_package_of(real)]
         return any(_lies_in(root, real) for root in roots)
 

@@ -26,6 +26,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -177,14 +178,10 @@ def version() -> str:
 def library() -> Any:
     """Return the modules of OpenUSD as attributes of one object; raise InputError without OpenUSD."""
     try:
-        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  the import of this optional package is slow
+        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  this import is slow
     except ImportError:
         raise InputError("OpenUSD is not installed", remedy=install_remedy("usd")) from None
-    return type(
-        "OpenUSD",
-        (),
-        {"Ar": Ar, "Gf": Gf, "Sdf": Sdf, "Tf": Tf, "Usd": Usd, "UsdGeom": UsdGeom, "UsdPhysics": UsdPhysics},
-    )
+    return SimpleNamespace(Ar=Ar, Gf=Gf, Sdf=Sdf, Tf=Tf, Usd=Usd, UsdGeom=UsdGeom, UsdPhysics=UsdPhysics)
 
 
 def files_of(pxr: Any, path: str) -> tuple[str, ...]:
