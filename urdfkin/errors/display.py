@@ -87,7 +87,6 @@ class Table:
         return f"<table>\n<thead>{row(self.heads, 'th')}</thead>\n<tbody>\n{body}\n</tbody>\n</table>"
 
     def latex(self) -> str:
-        """Return a LaTeX tabular that uses the package booktabs."""
         sides = "".join("l" if self.is_left(i) else "r" for i in range(len(self.heads)))
         rows = [
             " & ".join(lines.translate(ASCII).replace(" ", "~") + latex_text(words) for lines, words in row)
@@ -130,7 +129,6 @@ class Matrix:
         return f"<table>\n<tbody>\n{body}\n</tbody>\n</table>"
 
     def latex(self) -> str:
-        """Return a matrix in LaTeX that uses the package amsmath."""
         rows = r" \\ ".join(" & ".join(row) for row in self.rows)
         return rf"$\begin{{bmatrix}}{rows}\end{{bmatrix}}$"
 
@@ -184,7 +182,6 @@ class TextDocument:
         return f"<div>\n{body}\n</div>"
 
     def latex(self) -> str:
-        """Return LaTeX that uses the packages amsmath and booktabs."""
         return self._joined("latex", "\n\n", latex_text, lambda title: rf"\textbf{{{latex_text(title)}}}")
 
     def _joined(

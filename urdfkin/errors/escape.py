@@ -86,7 +86,6 @@ _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
 
 
 def latex_text(text: str) -> str:
-    """Return one line of text with the special characters of LaTeX escaped."""
     return "".join(_LATEX.get(character, character) for character in printable(text))
 
 

@@ -181,7 +181,6 @@ def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 
 def _computed_angles(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
-    """Yield C code that computes the angles which are not inputs themselves."""
     for node in layout.made:
         value = writer.whole(node, lambda x: at.format(layout.place(x)))
         yield f"{at.format(layout.place(node))} = {value}"
@@ -234,7 +233,6 @@ def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:
 
 
 def _numbers(values: Sequence[str]) -> str:
-    """Return numbers as the text of a C list, wrapped over several lines."""
     lines, line = list[str](), "       "
     for value in values:
         if len(line) + len(value) > 108:

@@ -74,7 +74,6 @@ class Code:
         return len(self.rates)
 
     def widths(self, function: Function) -> dict[str, int]:
-        """Return the length of each input of a function, by the input's letter."""
         return {letter: self.nq if letter == "q" else self.nv for letter in function.inputs}
 
     @property
@@ -158,7 +157,6 @@ def bare(
     reference: Reference,
     name: str,
 ) -> Code:
-    """Return the code of a frame without test vectors and without a comparison with Pinocchio."""
     coordinates, rates = coordinate_names(tree), rate_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
     return Code(
@@ -175,7 +173,6 @@ def bare(
 
 
 def exported() -> list[Quantity]:
-    """Return the quantities that can be exported."""
     return [row for row in recursive_quantities() if row.name in recursion.QUANTITIES]
 
 

@@ -317,9 +317,8 @@ class CompiledFrame:
     # -- inside --------------------------------------------------------------------------------------------
 
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
-        """Compile the function for one configuration, and call it."""
         with compiling, importing:
-            from urdfkin.compiled.machine.single import arrays_are_known, called  # noqa: PLC0415  it loads Numba
+            from urdfkin.compiled.machine.single import arrays_are_known, called  # noqa: PLC0415  slow import
 
         # The norm of a quaternion or the range of the results must be checked.
         own = self._tree.floating_joints or self._plan.is_large

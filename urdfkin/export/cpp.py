@@ -82,7 +82,6 @@ def _cuda(code: Code) -> str:
 
 
 def _entries(code: Code, function: Function) -> list[str]:
-    """Return the declarations of a function's C entry points, in double and in single precision."""
     name = f"{code.name}_{function.name}"
     return [
         f"int {name}_{real}(size_t n, {parameters(function, real)}, struct CUstream_st *stream)"

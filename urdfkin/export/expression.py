@@ -75,7 +75,6 @@ class Node:
 
     @property
     def operands(self) -> list[Node]:
-        """The operands that are not constants."""
         return [x for x in self.of if isinstance(x, Node)]
 
 
@@ -189,7 +188,6 @@ def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
 
 
 def needed(results: Sequence[Number]) -> list[Node]:
-    """Return all expressions that some results need, in the order in which they were created."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:

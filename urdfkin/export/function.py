@@ -70,13 +70,11 @@ class Function:
 
     @cached_property
     def angles(self) -> list[Node]:
-        """The angles whose sine or cosine the function computes."""
         found = (node.of[0] for node in self.nodes if node.op in ("sin", "cos"))
         return list(dict.fromkeys(found))
 
     @cached_property
     def statements(self) -> list[Node]:
-        """The expressions that the code assigns to variables, in the order of the assignments."""
         uses = Counter[Node]()
         for value in self.results:
             if isinstance(value, Node):

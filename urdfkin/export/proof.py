@@ -85,7 +85,6 @@ class Proof:
 
     @property
     def evaluated(self) -> str:
-        """Precision of the expressions that were compared with the oracle."""
         return "in double precision"
 
     @property
@@ -95,7 +94,6 @@ class Proof:
 
     @property
     def lines(self) -> list[str]:
-        """Lines of text for the file's header that describe the checks."""
         oracle = quiet(self.certificate.oracle)
         if not self.certificate.verified:
             reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"

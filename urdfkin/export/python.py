@@ -115,7 +115,6 @@ def _zero(writer: Writer, xp: str) -> str:
 
 
 def _demands(writer: Writer, first: str = "") -> list[str]:
-    """Return the lines of code that check the inputs."""
     return [
         f'_demand({first}"{x}", {x}, {width})' for x, width in writer.code.widths(writer.function).items()
     ]

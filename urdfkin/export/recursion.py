@@ -111,7 +111,6 @@ class TreeRecursion(Recursion):
                 assert_never(motion)
 
     def _own_values(self, i: int) -> tuple[Number, Number, Number]:
-        """Return the value, the velocity and the acceleration of a revolute or prismatic joint."""
         (_, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return multiplier * q[at] + constant, multiplier * v[rate_at], multiplier * a[rate_at]

@@ -40,7 +40,6 @@ def is_a(x: object, home: str) -> bool:
 
 @cache
 def installed_version(package: str) -> str | None:
-    """Return the installed version of a package, or None."""
     # The name of the metadata folder begins with the package's name.
     # This loop is faster than `importlib.metadata`, which takes 15 ms to import.
     start, end = f"{package.replace('-', '_')}-", ".dist-info"

@@ -94,7 +94,6 @@ def robots(family: str | None = None) -> tuple[str, ...]:
 
 
 def examples() -> tuple[str, ...]:
-    """Return the names of the robots of example-robot-data."""
     return tuple(name for name, entry in catalogue().items() if not entry.own)
 
 
@@ -199,8 +198,6 @@ _DESCRIPTION_NAME = re.compile(r"\w+_description")
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """The file of a robot description, and the arguments for a .xacro file."""
-
     path: Path
     xacro_args: Mapping[str, object] = field(default_factory=dict)
 

@@ -87,7 +87,6 @@ class Excerpts:
 
 
 def _cells(text: str) -> int:
-    """Return the number of terminal columns of a text."""
     return sum(
         0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
     )
@@ -112,7 +111,6 @@ class Fix:
 
     @property
     def is_safe(self) -> bool:
-        """Whether the fix rotates the joint frame by at most `ROUNDING`."""
         return self.turns <= ROUNDING
 
 
@@ -272,8 +270,6 @@ class Finding:
 
 
 class Findings(list[Finding], Displayable):
-    """The findings of one file, sorted by line. The list is displayed as a table."""
-
     def _sheet(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
         table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
@@ -285,7 +281,6 @@ def severity_counts(findings: Sequence[Finding]) -> dict[str, int]:
 
 
 def totals(findings: Sequence[Finding]) -> str:
-    """Return the number of errors, warnings and notes as text."""
     words = [f"{n} {word}{'s' if n > 1 else ''}" for word, n in severity_counts(findings).items() if n]
     return ", ".join(words) or "no findings"
 

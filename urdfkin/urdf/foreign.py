@@ -35,8 +35,6 @@ _NOWHERE = Element("", {}, None, 0, 0, 0)
 
 
 class XmlElement(Protocol):
-    """An element of Python's ElementTree or of lxml's."""
-
     @property
     def tag(self) -> Any: ...
 
@@ -45,8 +43,6 @@ class XmlElement(Protocol):
 
 
 class XmlTree(Protocol):
-    """A tree of `XmlElement`."""
-
     def getroot(self) -> Any: ...
 
 

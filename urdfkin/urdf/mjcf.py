@@ -379,7 +379,6 @@ def is_text(source: object) -> bool:
 
 
 def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
-    """Yield the elements that kinematics does not need, by kind."""
     for words in (
         "keys", "sensors", "actuators", "tendons", "excludes", "pairs", "skins", "flexes", "geoms", "cameras",
         "lights", "meshes", "hfields", "materials", "textures",

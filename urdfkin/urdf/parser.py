@@ -429,7 +429,6 @@ class _Builder:
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
     def _around(self) -> str | None:
-        """Return the text from the position of an error to the end of the line."""
         start = self.parser.ErrorByteIndex
         line = (self.report.data[start : start + 120].splitlines() or [b""])[0]
         text = line.decode("utf-8", "replace")[:30]
@@ -804,7 +803,6 @@ class JointReader:
         return None
 
     def _end(self, element: Element, tag: str) -> str | None:
-        """Return the link that a joint's `<parent>` or `<child>` names."""
         end = element.first(tag)
         if end is None:
             self.report.add(
@@ -927,7 +925,6 @@ _EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    """Return the known word most similar to `word`, or None."""
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 

@@ -103,7 +103,6 @@ class Element:
 
     @property
     def label(self) -> str | None:
-        """The name of the link or joint that contains this element."""
         return self.holder.attributes.get("name") if self.parent is not None else None
 
 

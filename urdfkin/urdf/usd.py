@@ -606,7 +606,6 @@ class _Reader:
             self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _owner(self, prim: Any) -> str | None:
-        """Return the path of the articulation root that contains a prim: the prim or its nearest ancestor."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 return str(prim.GetPath())
@@ -1175,7 +1174,6 @@ class _Reader:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
     def _compare_units(self, edge: _Edge, leader: str) -> None:
-        """Report a mimic rule between an angle and a length."""
         kinds = {edge.path: edge.kind for edge in self._edges}
         slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
         if len(slides) > 1:
@@ -1189,7 +1187,6 @@ class _Reader:
     # -- the whole -----------------------------------------------------------------------------------
 
     def _loose(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
-        """Report bodies near the robot that no joint connects with it."""
         joined = {path for group in found for path in group.bodies}
         top = f"/{chosen.path.split('/')[1]}/".replace("//", "/")
         for path in self._bodies:

@@ -96,7 +96,7 @@ MOST = 100_000_000
 
 
 class XacroError(UrdfkinError):
-    """A xacro file cannot be expanded."""
+    pass
 
 
 def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIENCE) -> bytes:
@@ -159,7 +159,6 @@ def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes
 
 
 def _answer(output: bytes) -> dict[str, Any]:
-    """Return the JSON object in the last line of the output, or an empty dict."""
     try:
         answer = json.loads(output.splitlines()[-1])
     except (IndexError, ValueError):

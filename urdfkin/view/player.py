@@ -27,8 +27,6 @@ _RATE, _FRAME_RATE, _MOST_FRAMES, _SIZE = 20.0, 12.5, 250, (640, 480)
 
 
 class Screen(Protocol):
-    """The attributes of a viewer that a `Player` uses."""
-
     server: Any
     robot: Robot
     frame: Any

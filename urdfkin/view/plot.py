@@ -52,8 +52,6 @@ def _look(k: int) -> dict[str, Any]:
 
 
 def _xyz(vector: Callable[[FrameMotion], FloatArray], label: str) -> Panel:
-    """Return the panel of a vector (n, 3)."""
-
     def panel(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         _lines(axes, t, vector(x), ("x", "y", "z"))
         axes.set_ylabel(label)
@@ -282,7 +280,6 @@ def _panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[
 
 
 def way(x: FrameMotion, trajectory: Trajectory) -> str:
-    """Return a line of text with the start, the end and the duration of the frame's motion."""
     ends = [
         "({})".format(", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0)) for k in (0, -1)
     ]

@@ -129,7 +129,6 @@ class RequestFilter:
 
     @property
     def is_local(self) -> bool:
-        """Whether only this machine can reach the server."""
         try:
             return ip_address(self.host).is_loopback
         except ValueError:
@@ -201,8 +200,6 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
         raise InputError("the viewer needs viser", remedy=install_remedy("view")) from None
 
     class PrivateServer(viser.ViserServer):
-        """Viser's server without sharing."""
-
         address: str
 
         def request_share_url(self, verbose: bool = True) -> str | None:

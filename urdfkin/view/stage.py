@@ -289,7 +289,6 @@ class Stage:
         fit(None)
 
     def _look(self, client: Any) -> None:
-        """Set the camera of a client so that the robot fills its view."""
         position, middle = camera(self._filling, aspect=client.camera.aspect, fov=client.camera.fov)
         with client.atomic():
             client.camera.up_direction = (0.0, 0.0, 1.0)
@@ -336,7 +335,6 @@ class Stage:
         )
 
     def ellipsoid(self, shape: Ellipsoid | None) -> None:
-        """Draw the velocity ellipsoid; None removes it."""
         self._scene.add_icosphere(
             "/ellipsoid",
             radius=1.0,

@@ -89,7 +89,6 @@ class Sliders:
         self.handles: list[Any] = []
 
     def build(self, values: FloatArray, *, degrees: bool) -> None:
-        """Replace the sliders by sliders in the given unit."""
         orders = [handle.order for handle in self.handles] or [None] * len(self.rows)
         for handle in self.handles:
             handle.remove()
@@ -156,7 +155,6 @@ class Sliders:
 
 
 def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, str]]:
-    """Return the limits as marks at the two ends of a slider."""
     first, last = (f"{round(x, 1):g}" if abs(x) >= 1.0 else f"{x:.2g}" for x in (lower, upper))
     return (lower, first), (upper, last)
 
@@ -174,7 +172,6 @@ def coordinate_rows(robot: Robot) -> list[Row]:
 
 
 def fixed_coordinates(robot: Robot) -> list[str]:
-    """Return the names of the coordinates whose limits are equal: they have no slider."""
     lower, upper = robot.limits
     return [robot.coordinate_names[i] for i in np.flatnonzero(lower == upper)]
 
@@ -219,7 +216,6 @@ def written(values: FloatArray) -> str:
 
 
 def numbers(x: FrameMotion) -> str:
-    """Return position, velocity, acceleration, singular values and check of one sample, as Markdown."""
     rows = [
         ("position", "m", x.placement[0, :3, 3]),
         ("velocity", "m/s", x.velocity[0, :3]),
@@ -421,7 +417,6 @@ class Viewer:
         return tip if tip in self.robot.frame_names else self.robot.frame_names[-1]
 
     def _move(self, letter: str, at: int, value: float) -> None:
-        """Change one number of q, v or a."""
         with self._lock:
             vector = getattr(self, letter).copy()
             vector[at] = value

@@ -83,7 +83,6 @@ def mend(
 
 
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
-    """Yield the reasons why a fix must not be applied."""
     code = fixable[0].code
     # The reporter stores a limited number of findings with one code.
     # After a fix, the reporter can store another of these findings, which would look new.

@@ -236,7 +236,6 @@ def check_materials(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
-    """Return the names of the defined materials, and report names with two definitions."""
     defined: dict[str, Element] = {}
     for material in robot.element.all("material"):
         name = material.attributes.get("name", "")

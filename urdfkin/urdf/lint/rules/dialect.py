@@ -399,15 +399,12 @@ _REPORTED = ("xacro:", "xi:include")
 
 @dataclass(slots=True)
 class _Use:
-    """The first use of a prefix, and the number of uses."""
-
     element: Element
     attribute: str | None
     times: int = 0
 
 
 def check_prefixes(report: Reporter, root: Element) -> None:
-    """Report each undeclared prefix once."""
     for prefix, use in _undeclared_prefixes(root).items():
         more = f" and {use.times - 1} more" if use.times > 1 else ""
         report.add(

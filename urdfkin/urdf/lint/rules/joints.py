@@ -180,7 +180,6 @@ _TILT = 2.0**-52
 
 
 def check_axes(report: Reporter, robot: RobotRecord) -> None:
-    """Report axes without a direction, axes that are not unit vectors, and axes that are not used."""
     for joint in robot.joints:
         if joint.kind in AXIAL:
             _check_axis(report, joint)
@@ -443,7 +442,6 @@ class _MimicChecker:
             self.check_sound(joint, mimic, leader)
 
     def unknown(self, mimic: MimicRecord) -> None:
-        """Report a mimic rule whose mimicked joint does not exist."""
         nearest = self.report.nearest(mimic.leader, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
@@ -451,7 +449,6 @@ class _MimicChecker:
         self.add(MIMIC_UNKNOWN, "the mimicked joint does not exist", mimic, "joint", remedy)
 
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
-        """Report probable mistakes in a valid mimic rule."""
         if mimic.multiplier == 0.0:
             self.add(
                 MIMIC_CONSTANT,
