@@ -130,9 +130,9 @@ class TreeRecursion(Recursion):
 def _without_rounding(x: Sequence[float]) -> Vector:
     """Return a constant vector in which entries below the rounding of the largest entry are replaced by 0.
 
-    For example, the cosine of the double nearest to pi/2 is 6e-17. The exported code would contain useless
-    products with such numbers. The error bounds of `urdfkin.kinematics.roundings` include the error that this
-    replacement causes. Exact constants have no rounding.
+    For example, the cosine of the double nearest to pi/2 is 6e-17. Without this function, the exported code
+    would contain useless products with such numbers. The error bounds of `urdfkin.kinematics.roundings`
+    include the error that this replacement causes. Exact constants have no rounding.
     """
     if not all(isinstance(c, float) for c in x):
         return x[0], x[1], x[2]

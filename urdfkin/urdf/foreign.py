@@ -224,7 +224,7 @@ class _ModelReader:
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return a frame's parent link and its pose in this link. T is its pose in the joint frame."""
+        """Return a frame's parent link and its pose in this link. T is its pose in its parent joint."""
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T

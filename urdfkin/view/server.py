@@ -339,17 +339,13 @@ def _test_the_filter(requests: RequestFilter, port: int) -> None:
         "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
     }
     here, there = {"Host": host}, {"Host": "rebound.invalid"}
+    foreign, keyless = (here | socket_ | {"Origin": x} for x in ("http://x.invalid", f"http://{host}"))
     cases: tuple[tuple[str, str, dict[str, str], int], ...] = (
         ("its own page", f"/{requests.key}/", here, 200),
         ("a page without the key", "/", here, 403),
         ("a page under another name", f"/{requests.key}/", there, 403),
-        (
-            "another page's connection",
-            f"/{requests.key}",
-            here | socket_ | {"Origin": "http://x.invalid"},
-            403,
-        ),
-        ("a connection without the key", "/", here | socket_ | {"Origin": f"http://{host}"}, 403),
+        ("another page's connection", f"/{requests.key}", foreign, 403),
+        ("a connection without the key", "/", keyless, 403),
     )
     for what, path, headers, expected in cases:
         connection = http.client.HTTPConnection(host, timeout=30)

@@ -32,7 +32,7 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: `--fix` makes at most this number of passes over a file, because one pass applies the fixes of one code.
+#: `--fix` makes at most this number of passes over a file. One pass applies the fixes of one code.
 #: If two fixes overlap, the second fix needs another pass.
 PASSES = 100
 
