@@ -109,15 +109,9 @@ def code_of(
 ) -> Code:
     """Return the code of a frame with test vectors and with the result of the comparison with Pinocchio.
 
-    Args:
-        verifier: Verifier of the robot.
-        plan_of: Function that returns the compiled tree of the joints that move the given links.
-        frame: Name of a link or joint.
-        quantities: Names of quantities.
-        reference: Reference frame of velocities, accelerations and Jacobians.
-        name: Prefix of the function names. None: the prefix consists of the names of the robot and the frame.
-        verify: As in `Robot.export`.
-        about: Text for the file's header: the Denavit-Hartenberg table or the screws.
+    `plan_of` returns the compiled tree of the joints that move the given links. By default, the prefix `name`
+    of the functions consists of the names of the robot and the frame. `about` is a text for the file's
+    header: the Denavit-Hartenberg table or the screws.
 
     Raises:
         UnknownNameError: the frame, a quantity or the reference is unknown.

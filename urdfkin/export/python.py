@@ -190,12 +190,9 @@ def _demand(
 ) -> str:
     """Return the code of a function that checks an input.
 
-    Args:
-        wrong: Expression that is true if the numbers have another type.
-        given: Further arguments of the function.
-        numbers: Name of the accepted types.
-        array: Name of the accepted container.
-        is_array: Expression that tests for the container; "" if the input is always one.
+    The expression `wrong` is true if the numbers have another type, and `is_array` tests for the container
+    ("" if the input is always one). `given` are further arguments of the function. `numbers` and `array` name
+    the accepted types and container.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)

@@ -47,11 +47,8 @@ class Kind:
 class TreeRecursion(Recursion):
     """The forward recursion along one path.
 
-    Args:
-        plan: The compiled tree of one frame.
-        kind: The kind of number.
-        inputs: q, v and a. An input that is not needed consists of zeros.
-        own: Whether the motion of each link is computed in the axes of the link's own frame.
+    The inputs are q, v and a; an input that is not needed consists of zeros. With `own`, the motion of each
+    link is computed in the axes of the link's own frame.
 
     Attributes:
         states: The state after each step.

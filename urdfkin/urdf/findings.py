@@ -506,21 +506,15 @@ class Reporter:
         weight: float = 0.0,
         fix: Callable[[], Fix | None] | None = None,
     ) -> None:
-        """Add a finding.
+        """Add a finding with a message, the wrong text `found` (in quotes) and a remedy.
 
-        Args:
-            rule: The rule.
-            message: The problem in one clause.
-            at: The element with the problem. If it is None, the finding is at `position`.
-            attribute: Name of the attribute of `at` that the printed excerpt of the file underlines.
-            found: The wrong text in the file, in quotes.
-            remedy: The remedy.
-            owner: The tag that the finding names. None: the tag of the link or joint that contains `at`. Set
-                `owner` if `at` is a link or joint in the wrong place.
-            severity: Severity of the finding; None: the severity of the rule.
-            position: Line and column of the finding, if `at` is None.
-            weight: If findings of one kind are combined, the finding with the greatest weight is reported.
-            fix: A function that returns the automatic fix; None if there is no automatic fix.
+        - `at` is the element with the problem. Without `at`, the finding is at `position` (line and column).
+        - `attribute` is the attribute of `at` that the printed excerpt of the file underlines.
+        - `owner` is the tag that the finding names, if `at` is a link or joint in the wrong place.
+          By default, the finding names the link or joint that contains `at`.
+        - `severity` replaces the severity of the rule.
+        - `weight`: if findings of one kind are combined, the finding with the greatest weight is reported.
+        - `fix` returns the automatic fix, or None.
         """
         severity = rule.severity if severity is None else severity
         # A comment cannot silence an error.

@@ -28,10 +28,8 @@ from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRec
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
     """Return the kinematic tree of a URDF, whose records have no errors (see `urdfkin.urdf.lint`).
 
-    Args:
-        urdf: The records.
-        mimic: True: mimic joints follow their mimicked joints, as URDF defines. False: they move freely.
-        root_joint: `"floating"` or `"planar"` adds a joint `root_joint` of this kind above the root link.
+    With `mimic`, mimic joints follow their mimicked joints, as URDF defines; otherwise they move freely. The
+    kind `root_joint`, "floating" or "planar", adds a joint `root_joint` above the root link.
 
     Raises:
         InputError: the joints do not form a tree, mimic joints form a cycle, or `root_joint` is another word.

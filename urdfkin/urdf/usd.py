@@ -290,12 +290,8 @@ def read_usd(
 ) -> Usd:
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
-    Args:
-        path: The file.
-        name: The name of the file in messages.
-        variants: Pairs (variant set, variant). For one pair after the other, the variant is selected in all
-            prims that have the variant set.
-        articulation: Path or name of the articulation to read; None if there is only one.
+    For one pair of `variants` after the other, the variant is selected in all prims that have the variant
+    set. `articulation` is the path or name of the articulation to read; None if there is only one.
 
     Raises:
         InputError: OpenUSD is not installed or does not accept the file, a reference is refused, the robot

@@ -60,7 +60,6 @@ class Row:
     Attributes:
         at: Index in the vector.
         turns: Whether the number is an angle or a derivative of an angle.
-        lower, upper: Range of the slider.
     """
 
     at: int
@@ -73,12 +72,8 @@ class Row:
 class Sliders:
     """A group of sliders in the viewer's panel, for example for all joint velocities.
 
-    Args:
-        gui: Viser's GUI.
-        folder: The folder of the sliders.
-        rows: The numbers to show.
-        rate: Text after the unit: "" for q, "/s" for v, "/s²" for a.
-        moved: Function that is called with the index and the new number when the user moves a slider.
+    The unit of a slider ends with `rate`: "" for q, "/s" for v, "/s²" for a. When the user moves a slider,
+    `moved` is called with the index and the new number.
     """
 
     def __init__(

@@ -148,12 +148,9 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
     """Parse and check the bytes in a reporter, and return the records; None if the file is not a URDF.
 
-    Args:
-        report: A reporter with the name, the bytes and the limits of the file. It collects the findings.
-        mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
-            are notes.
-        root_joint: `"floating"` or `"planar"` if the robot gets such a joint. The file must not contain the
-            names of this additional joint and of its parent link.
+    If `mimic` is False, mimic joints move freely, and all findings about them are notes. The kind
+    `root_joint`, "floating" or "planar", adds a joint; the file must not contain the names of this joint and
+    its parent link.
     """
     root = read_document(report)
     read_comments(report, CODES)
