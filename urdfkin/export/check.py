@@ -33,7 +33,7 @@ _COMPILE = {
 }
 #: This command compiles a CUDA file for the GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: `_MARK` and the word UNVERIFIED are searched in this number of characters.
+#: This number of characters at the start of a file is searched for `_MARK` and the word UNVERIFIED.
 _HEAD = 2000
 #: A command ends after this time (s). The code of a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0

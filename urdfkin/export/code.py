@@ -21,7 +21,7 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
-#: A sum has the lowest precedence, and an operand without brackets the highest.
+#: A sum has the lowest precedence. An operand that needs no brackets has the highest precedence.
 _SUM, _SIGN, _PRODUCT, _ATOM = range(4)
 _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
@@ -258,7 +258,7 @@ class Writer:
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return the text of an expression, such as an angle, without variables that are not inputs."""
+        """Return an expression, such as an angle, as a text that contains only inputs and constants."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.words:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import plain
 
-#: An identifier without a prefix is not longer. With a prefix, MATLAB allows 63 characters.
+#: An identifier has at most this length without a prefix. With a prefix, MATLAB allows 63 characters.
 _LONGEST = 40
 _LONGEST_SHOWN = 80
 

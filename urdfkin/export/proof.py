@@ -240,10 +240,10 @@ def _rounded_down(x: float) -> str:
 
 
 def _rounded_up(x: float) -> str:
-    """Return x with seven digits, rounded up; 0.0 (accepts only equal numbers) for an x that is not finite.
+    """Return x with seven digits, rounded up; 0.0 for an x that is not finite.
 
-    The bound must not be rounded down, because the error of a constant in single precision can be equal to
-    its bound.
+    With the bound 0.0, only equal numbers are accepted. The bound must not be rounded down, because the error
+    of a constant in single precision can be equal to its bound.
     """
     return _rounded(x, 7, ROUND_CEILING)
 

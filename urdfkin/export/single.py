@@ -26,7 +26,7 @@ from urdfkin.model.tree import FloatArray
 
 #: One backward pass computes the derivatives of at most this number of results, which limits the memory.
 _TOGETHER = 512
-#: Each operation has the derivatives of its value with respect to its operands.
+#: These functions return the derivatives of an operation's value with respect to its operands.
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
     "+": lambda value, x, y: (1.0, 1.0),
     "-": lambda value, x, y: (1.0, -1.0),

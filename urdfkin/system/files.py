@@ -150,7 +150,7 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists; a name that is too long exists, but reading it raises an error."""
+    """Return whether a path exists, or is too long: then the error occurs when the file is read."""
     try:
         return path.exists()
     except OSError:

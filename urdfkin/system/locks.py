@@ -11,7 +11,7 @@ import os
 import threading
 
 _locks: list[threading.RLock] = []
-#: Each forking thread, by its identifier, has the locks that it acquired before the fork.
+#: This dictionary maps the identifier of a forking thread to the locks that it acquired before the fork.
 _acquired: dict[int, list[threading.RLock]] = {}
 
 

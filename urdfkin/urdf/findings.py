@@ -643,7 +643,7 @@ class Reporter:
         )
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element, and its line if nothing else is on it."""
+        """Return the fix that removes an empty element, or the whole line if it has nothing else."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None

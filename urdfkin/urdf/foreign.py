@@ -152,7 +152,7 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: A limit above this number is missing: Pinocchio stores the largest double for it.
+#: A limit above this number counts as missing: Pinocchio stores the largest double for no limit.
 _ENDLESS = 1e300
 
 

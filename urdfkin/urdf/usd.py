@@ -656,7 +656,7 @@ class _Reader:
         return edge
 
     def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
-        """Convert a pose in the world (`body` is None) to the stage's up axis; other poses stay."""
+        """Convert a pose in the world (`body` is None) to the stage's up axis; other poses stay unchanged."""
         return T if body is not None else pose(self._up.T) @ T
 
     def _side(

@@ -194,7 +194,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes; return whether the viewer shows the skeleton, because one or all are missing."""
+        """Add the shapes; return whether any is missing or there are none: then the skeleton is shown."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)

@@ -287,7 +287,7 @@ class Choice:
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return the function of `of` with copies of the baselines, for a second check of the same file."""
+        """Return the same filter as `of` with copies of the baselines, for a second check of a file."""
         copies = [
             None if known is None else replace(known, counts=Counter(known.counts))
             for known in (self.baseline, before)

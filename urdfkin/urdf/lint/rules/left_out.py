@@ -39,7 +39,7 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: Elements are searched in this number of bytes.
+#: At most this number of bytes of a file is searched for elements.
 _SEARCHED = 10_000_000
 #: XML that is not an element has these beginnings and ends.
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
