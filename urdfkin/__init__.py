@@ -69,8 +69,8 @@ _HOMES = {
     "verify_function": "urdfkin.validation.functions",
 }
 
-# docs/architecture.md lists the packages in an order. A package imports only from packages that are earlier
-# in this list. Some methods call functions of later packages: these functions are registered here.
+# A package imports only from packages that are earlier in the list of docs/architecture.md.
+# A hook lets a method call a function of a later package.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
 register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))

@@ -3,8 +3,8 @@
 import os
 import sys
 
-# Python puts the current folder first on sys.path. Remove this folder from sys.path, unless it contains
-# urdfkin. Do not use pathlib here: the current folder may contain a file pathlib.py.
+# Python puts the current folder first on sys.path, where a file of the folder could replace a module.
+# This code does not use pathlib, because the current folder may contain a file pathlib.py.
 _home = os.path.realpath(f"{__file__}/../..")
 if not sys.flags.safe_path and os.path.realpath(sys.path[0]) != _home:
     del sys.path[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
 from urdfkin.dh import dh_table
 from urdfkin.errors import InputError
-from urdfkin.view.dh_drawing import drawing
+from urdfkin.view.dh_drawing import drawing, row_corners
 
 pytest.importorskip("matplotlib")
 LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0)
@@ -41,3 +42,18 @@ def test_a_chain_without_motion_can_be_drawn_and_a_batch_cannot() -> None:
     assert "<svg" in drawing(dh_table(arm(tip=LINK), "tip"))
     with pytest.raises(InputError, match="needs exactly one configuration"):
         drawing(dh_table(arm(LINK), "tip"), np.zeros((2, 1)))
+
+
+@pytest.mark.parametrize(("convention", "beta"), [("standard", 0.0), ("standard", 0.3), ("modified", 0.0)])
+def test_the_two_lines_of_a_row_lie_on_the_joint_axis_and_on_the_common_normal(
+    convention: str, beta: float
+) -> None:
+    table = dh_table(arm(LINK, LINK), "tip", convention=convention)
+    table = replace(table, rows=tuple(replace(row, beta=beta) for row in table.rows))
+    frames = table.frames([0.5, -0.7])
+    corners, standard = row_corners(table, frames), convention == "standard"
+    starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
+    z = (frames[:-1] if standard else frames[1:])[:, :3, 2]
+    along, across = (corners - starts, ends - corners) if standard else (ends - corners, corners - starts)
+    np.testing.assert_allclose(np.cross(along, z), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(across, axis=1), [abs(row.a) for row in table.rows], atol=1e-12)

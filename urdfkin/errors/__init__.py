@@ -18,11 +18,11 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: Number of leading characters of a name that `nearest` compares.
+#: `nearest` compares at most this number of leading characters of a name.
 _COMPARED = 128
 
-#: Default limit of `nearest`: number of pairs of characters to compare for one word. A name that is rejected
-#: without a comparison does not count.
+#: By default, `nearest` compares at most this number of pairs of characters for one word.
+#: A name that is rejected without a comparison does not count.
 WORK = 1_000_000
 #: Largest number of suggested names.
 _OFFERED = 3
@@ -31,14 +31,8 @@ _OFFERED = 3
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
     """Return up to three known names that look like `word`, the most similar first.
 
-    Similarity is measured as in `difflib.get_close_matches`, but the amount of work is bounded.
-
-    Args:
-        word: The misspelt name.
-        known: The existing names.
-        cutoff: Least similarity, from 0 to 1.
-        work: Largest number of pairs of characters to compare. When the limit is reached, `nearest` returns
-            the names found so far.
+    `cutoff` is the least similarity, from 0 to 1, as in `difflib.get_close_matches`. After `work` compared
+    pairs of characters, the search ends with the names found so far.
 
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
@@ -154,13 +148,11 @@ class UrdfkinError(Exception):
         remedy = f"; {self.remedy}" if self.remedy else ""
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
-        # The message contains names from files. Such a name must not add lines or terminal commands to the
-        # output.
+        # A name from a file must not add lines or terminal commands to the output.
         return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
-        # `validate --jobs` sends errors between processes by pickle. Python's default `__reduce__` would lose
-        # the keyword arguments.
+        # `validate --jobs` pickles errors. Python's own `__reduce__` would lose the keyword arguments.
         return _rebuild, (type(self), self.__dict__)
 
 
@@ -253,12 +245,8 @@ class SourceError(UrdfkinError, OSError):
 class RepresentationSingularityError(InputError):
     """Euler angles are at their representational singularity, where their derivatives do not exist (7.56).
 
-    The motion itself is regular. Only its description by Euler angles is singular.
-
-    Attributes:
-        sequence: The Euler sequence.
-        distance: Difference between the middle Euler angle and its value at the singularity, radians.
-        sample: Index of the worst sample in the batch; () for a single sample.
+    The motion itself is regular. `distance` is the difference in radians between the middle angle and its
+    value at the singularity. `sample` is the index of the worst sample of a batch, () for a single sample.
     """
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:

@@ -1,8 +1,7 @@
 """Display of objects as text, HTML, Markdown and LaTeX.
 
-A displayed class is a subclass of `Displayable`. Its method `_sheet` returns a `TextDocument`, which consists
-of a title, sentences and tables. `Displayable` makes the output of `print` and of notebooks from this
-document. Names come from files and may contain any characters, so each format escapes them.
+The method `_sheet` of a `Displayable` returns a `TextDocument`; `print` and notebooks display this document.
+Names come from files and may contain any characters, so each format escapes them.
 """
 
 from __future__ import annotations
@@ -13,24 +12,20 @@ from html import escape
 
 from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_code, markdown_text, printable
 
-#: Characters that draw the branches of a tree before a name. `ASCII` has their replacements.
+#: These characters draw the branches of a tree before a name. `ASCII` has their replacements.
 LINES = "├│└ "
 ASCII = str.maketrans("├│└", "+|`")
-#: A number below this fraction of a table's largest number counts as a rounding error and is displayed as 0.
-#: This affects display only: machine-readable output has all digits, and no check uses the displayed value.
+#: A number below this fraction of a table's largest number is displayed as 0.
+#: Machine-readable output has all digits, and no check uses the displayed value.
 NOISE = 1e-15
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of text and numbers.
+    """A table of text and numbers; numbers are displayed with six digits.
 
     Attributes:
-        heads: Titles of the columns.
-        rows: Cells of each row. Numbers are displayed with six digits.
-        left: The left-aligned columns. If `left` is a number n, the first n columns are left-aligned. If
-            `left` is a list, it contains the indices of the left-aligned columns. Blanks at the start of a
-            left-aligned cell are displayed.
+        left: Number of the left-aligned columns, or their indices. These cells keep their leading blanks.
         names: Indices of columns with names. Markdown displays names as code.
     """
 
@@ -40,11 +35,9 @@ class Table:
     names: Collection[int] = ()
 
     def is_left(self, i: int) -> bool:
-        """Return whether a column is left-aligned."""
         return i < self.left if isinstance(self.left, int) else i in self.left
 
     def cells(self) -> list[list[str]]:
-        """Return the cells of each row as text."""
         largest = max((abs(x) for row in self.rows for x in row if not isinstance(x, str)), default=0.0)
         return [
             [x if isinstance(x, str) else six_digits(x, NOISE * largest) for x in row] for row in self.rows
@@ -58,7 +51,6 @@ class Table:
         ]
 
     def text(self) -> str:
-        """Return the table as aligned plain text."""
         body = [[log_line(cell) for cell in row] for row in (self.heads, *self.cells())]
         widths = [max(map(len, column)) for column in zip(*body, strict=True)]
         lines = [
@@ -71,7 +63,6 @@ class Table:
         return "\n".join([lines[0], "-" * (sum(widths) + 2 * (len(widths) - 1)), *lines[1:]])
 
     def markdown(self) -> str:
-        """Return the table in Markdown."""
         marks = [":---" if self.is_left(i) else "---:" for i in range(len(self.heads))]
         heads, *rows = self._split_cells()
 
@@ -84,8 +75,6 @@ class Table:
         return "\n".join(f"| {' | '.join(row)} |" for row in (titles, marks, *body))
 
     def html(self) -> str:
-        """Return the table in HTML with inline styles."""
-
         def row(cells: Sequence[str], tag: str) -> str:
             sides = ("left;white-space:pre" if self.is_left(i) else "right" for i in range(len(cells)))
             cells = [
@@ -98,7 +87,6 @@ class Table:
         return f"<table>\n<thead>{row(self.heads, 'th')}</thead>\n<tbody>\n{body}\n</tbody>\n</table>"
 
     def latex(self) -> str:
-        """Return a LaTeX tabular that uses the package booktabs."""
         sides = "".join("l" if self.is_left(i) else "r" for i in range(len(self.heads)))
         rows = [
             " & ".join(lines.translate(ASCII).replace(" ", "~") + latex_text(words) for lines, words in row)
@@ -123,20 +111,16 @@ class Matrix:
     rows: Sequence[Sequence[str]]
 
     def lines(self) -> list[str]:
-        """Return the rows with aligned columns."""
         widths = [max(map(len, column)) for column in zip(*self.rows, strict=True)]
         return ["  ".join(map(str.rjust, row, widths)) for row in self.rows]
 
     def text(self) -> str:
-        """Return indented lines."""
         return "\n".join(f"  {line}" for line in self.lines())
 
     def markdown(self) -> str:
-        """Return a block of code."""
         return "\n".join(["```", *self.lines(), "```"])
 
     def html(self) -> str:
-        """Return a table without headings in HTML."""
         rows = (
             "".join(f'<td style="text-align:right;padding:0 .5em">{escape(cell)}</td>' for cell in row)
             for row in self.rows
@@ -145,23 +129,17 @@ class Matrix:
         return f"<table>\n<tbody>\n{body}\n</tbody>\n</table>"
 
     def latex(self) -> str:
-        """Return a matrix in LaTeX that uses the package amsmath."""
         rows = r" \\ ".join(" & ".join(row) for row in self.rows)
         return rf"$\begin{{bmatrix}}{rows}\end{{bmatrix}}$"
 
 
 class Strong(str):
-    """A sentence with emphasis.
-
-    Attributes:
-        style: The style on a terminal, such as "bold red".
-    """
+    """A sentence with emphasis; `style` is its style on a terminal, such as "bold red"."""
 
     __slots__ = ("style",)
     style: str
 
     def __new__(cls, words: str, style: str = "bold") -> Strong:
-        """Return the sentence with a style."""
         sentence = super().__new__(cls, words)
         sentence.style = style
         return sentence
@@ -175,12 +153,9 @@ class Code(str):
 
 @dataclass(frozen=True, slots=True)
 class TextDocument:
-    """The displayed content of an object.
+    """A title, and sentences, tables and matrices.
 
-    Attributes:
-        title: The title; empty if the document has no title.
-        parts: Sentences, tables and matrices, in order. In plain text, an empty string is printed as a blank
-            line.
+    The title may be empty. Plain text has a blank line for each empty string of `parts`.
     """
 
     title: str
@@ -192,26 +167,21 @@ class TextDocument:
         return text + "\n"
 
     def text(self) -> str:
-        """Return plain text for a terminal."""
         return self._joined("text", "\n", log_line, log_line)
 
     def markdown(self) -> str:
-        """Return Markdown."""
-
         def sentence(words: str) -> str:
             return markdown_code(words) if isinstance(words, Code) else markdown_text(words)
 
         return self._joined("markdown", "\n\n", sentence, lambda title: f"**{markdown_text(title)}**")
 
     def html(self) -> str:
-        """Return an HTML `div`."""
         body = self._joined(
             "html", "\n", lambda x: f"<p>{_html(x)}</p>", lambda x: f"<p><b>{_html(x)}</b></p>"
         )
         return f"<div>\n{body}\n</div>"
 
     def latex(self) -> str:
-        """Return LaTeX that uses the packages amsmath and booktabs."""
         return self._joined("latex", "\n\n", latex_text, lambda title: rf"\textbf{{{latex_text(title)}}}")
 
     def _joined(

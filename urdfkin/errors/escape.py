@@ -13,16 +13,15 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-#: First characters that make a spreadsheet interpret a cell as a formula.
+#: A spreadsheet interprets a cell that begins with one of these characters as a formula.
 FORMULA = ("=", "+", "-", "@")
-#: Patterns of commands to a CI service. Commands of Azure and TeamCity may be anywhere in a line, commands of
-#: GitHub at its beginning. The character to escape is the group (in parentheses) of each pattern. JSON and
-#: TOML parsers turn the escape back into the character.
+#: This pattern matches a command of Azure or TeamCity, which may be anywhere in a line.
+#: Group 1 is the character to escape. JSON and TOML parsers turn the escape back into the character.
 COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
+#: A command of GitHub is at the beginning of a line.
 COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
-#: An invisible character (word joiner). The character keeps Markdown from turning text into a link, a mention
-#: or an issue number.
+#: An invisible character (word joiner) keeps Markdown from making a link, a mention or an issue number.
 _JOINER = "&#8288;"
 
 
@@ -41,8 +40,6 @@ def printable(text: str) -> str:
 def log_line(text: str) -> str:
     r"""Return one line that is safe for a terminal and for the log of a CI service.
 
-    The line is escaped like the result of `printable`. In addition, commands to the CI service are escaped.
-
     Example:
         >>> print(log_line("::error::a\n##vso[b]"))
         :\u003aerror::a\n##vso\u005bb]
@@ -54,13 +51,13 @@ def log_line(text: str) -> str:
 
 
 def markdown_text(words: str) -> str:
-    r"""Escape a sentence for Markdown: one line without markup, HTML, links and mentions.
+    r"""Escape a sentence for Markdown: one line without markup, HTML, links, mentions, lists and rules.
 
     Example:
         >>> markdown_text("<b>*x*"), markdown_text("1. x")
         ('&lt;b&gt;\\*x\\*', '1\\. x')
     """
-    return re.sub(r"^(\d*)([-+=.])", r"\1\\\2", markdown_cell(words))  # prevents a list or a horizontal rule
+    return re.sub(r"^(\d*)([-+=.])", r"\1\\\2", markdown_cell(words))
 
 
 def markdown_cell(words: str) -> str:
@@ -72,9 +69,7 @@ def markdown_cell(words: str) -> str:
 
 
 def markdown_code(name: str) -> str:
-    r"""Return a name as Markdown code, for text and for table cells.
-
-    Backticks, which would end the code, and bars, which would end the cell, are escaped.
+    r"""Return a name as Markdown code, with escapes for backticks and for the bars that end a table cell.
 
     Example:
         >>> print(markdown_code("a`|b"))
@@ -91,7 +86,6 @@ _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
 
 
 def latex_text(text: str) -> str:
-    """Return one line of text with the special characters of LaTeX escaped."""
     return "".join(_LATEX.get(character, character) for character in printable(text))
 
 
@@ -119,7 +113,7 @@ def json_text(data: Any) -> str:
 
 
 def escape(c: str) -> str:
-    """Return the escape sequence of a character in Python and TOML. Up to U+FFFF, JSON accepts it too."""
+    """Return the escape sequence of a character in Python and TOML, and up to U+FFFF also in JSON."""
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
 

@@ -1,9 +1,8 @@
 """Strict parsing of numbers, and of numbers with units.
 
-`parse_float` and `parse_int` accept finite numbers in decimal ASCII digits only. Python's `float` also
-accepts `1_0`, Arabic digits, `nan` and `infinity`, so the text is first matched with the grammar of
-`xs:double` without its special values. `parse_quantity` parses a number with a unit: `30deg`, `pi/2`, `5 mm`,
-`-2*pi/3`, `90 deg/s`.
+`parse_float` and `parse_int` accept finite numbers in decimal ASCII digits only: the grammar of `xs:double`
+without its special values. Python's `float` also accepts `1_0`, Arabic digits, `nan` and `infinity`.
+`parse_quantity` parses a number with a unit: `30deg`, `pi/2`, `5 mm`, `-2*pi/3`, `90 deg/s`.
 """
 
 from __future__ import annotations
@@ -12,14 +11,13 @@ import math
 import re
 from typing import NamedTuple
 
-#: The grammar of a decimal number. Matching takes time linear in the length of the text.
+#: Matching a decimal number takes time linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WHOLE = re.compile(r"[+-]?[0-9]+")
-#: Longest accepted number, in characters: Python converts long integers in quadratic time.
+#: A number has at most this number of characters: Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: Remedies for texts that are no numbers. Each entry has a pattern and a remedy; the first matching pattern
-#: counts.
+#: The first pattern that matches a text determines the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
@@ -60,7 +58,7 @@ def remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: The accepted names of units, each with the unit's short name.
+#: Each accepted name of a unit has a short name.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),
@@ -77,13 +75,11 @@ _LONGEST_QUANTITY = 200
 
 
 class Measured(NamedTuple):
-    """A parsed number with its unit.
+    """A number in radians or metres if its text has a unit.
 
     Attributes:
-        value: The number. If the text contains a unit, the number is converted to radians or metres.
         unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
-        per: Exponent of the seconds in the denominator of the unit: 0 for a position, 1 for a velocity such
-            as rad/s, 2 for an acceleration such as rad/s^2.
+        per: Exponent of the seconds in the denominator of the unit: 1 for rad/s, 2 for rad/s^2.
     """
 
     value: float

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 from numbers import Real
+from operator import index
 from typing import Any, TypeGuard
 
 from urdfkin.errors import InputError
@@ -19,17 +20,10 @@ def whole_number(value: object, name: str, least: int, most: float = math.inf) -
     Traceback (most recent call last):
     urdfkin.errors.InputError: threads must be a whole number, at least 1: found True
     """
-    if type(value) is int:  # the usual case
-        number = value
-    elif isinstance(value, bool) or not hasattr(type(value), "__index__"):
-        raise InputError(f"{name} must be a whole number, at least {least}", found=safe_repr(value))
-    else:
-        try:
-            number = value.__index__()  # type: ignore[attr-defined]
-        except TypeError:  # a NumPy array has `__index__` too, but raises TypeError
-            raise InputError(
-                f"{name} must be a whole number, at least {least}", found=safe_repr(value)
-            ) from None
+    try:
+        number = index(None if isinstance(value, bool) else value)  # type: ignore[arg-type]
+    except TypeError:
+        raise InputError(f"{name} must be a whole number, at least {least}", found=safe_repr(value)) from None
     if not least <= number <= most:
         beyond = f"{name} must be at most {most}" if number > most else f"{name} must be at least {least}"
         raise InputError(beyond, found=safe_repr(value))
@@ -48,7 +42,7 @@ def real_number(value: object, name: str) -> float:
 
 
 def is_real(value: object) -> TypeGuard[Real]:
-    """Return whether `value` is a real number; text, booleans and None are not."""
+    """Return whether `value` is a real number; a boolean is not."""
     return isinstance(value, Real | Decimal) and not isinstance(value, bool)
 
 
@@ -61,22 +55,17 @@ def as_float(value: Any) -> float:
 
 
 def as_str(value: object, name: str) -> str:
-    """Return `value` if it is a string."""
     if not isinstance(value, str):
         raise InputError(f"{name} must be a name", found=safe_repr(value))
     return value
 
 
 def as_choice(value: str | None, default: str, name: str) -> str:
-    """Return `value` if it is a string, and the default for None."""
     return default if value is None else as_str(value, name)
 
 
 def as_names(value: Any, name: str) -> tuple[str, ...]:
-    """Return `value` as a tuple of names.
-
-    The entries are checked later, when they are looked up in the robot.
-    """
+    """Return `value` as a tuple; the caller looks up the entries in the robot."""
     if isinstance(value, str):
         raise InputError(
             f"{name} must be a list of names", found=safe_repr(value), remedy=f"write [{safe_repr(value)}]"
@@ -88,7 +77,6 @@ def as_names(value: Any, name: str) -> tuple[str, ...]:
 
 
 def as_bool(value: object, name: str) -> bool:
-    """Return `value` if it is True or False."""
     if value is True or value is False:
         return value
     raise InputError(f"{name} must be True or False", found=safe_repr(value))
@@ -98,5 +86,5 @@ def safe_repr(value: object) -> str:
     """Return the repr of a value for a message, at most 60 characters; it never raises."""
     try:
         return repr(value)[:60]
-    except Exception:  # a repr may raise any exception: for an int with 5,000 digits it raises ValueError
+    except Exception:  # for example, the repr of an int with 5,000 digits raises ValueError
         return f"an object of type {type(value).__name__}"

@@ -11,7 +11,7 @@ from urdfkin.export.seal import seal
 if TYPE_CHECKING:
     from urdfkin.export.code import Code
 
-#: For each language: the module of `write`, the suffix of files, and a summary in one line.
+#: Each language has a module, a suffix of files, and a summary in one line.
 LANGUAGES: dict[str, tuple[str, str, str]] = {
     "c": ("urdfkin.export.c", ".c", "C99, single or double precision, one configuration or a batch"),
     "cpp": ("urdfkin.export.cpp", ".hpp", "C++11, a header of templates for any number type"),
@@ -27,7 +27,7 @@ LANGUAGES: dict[str, tuple[str, str, str]] = {
     "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
     "latex": ("urdfkin.export.latex", ".tex", "LaTeX formulas in the textbook's symbols"),
 }
-#: Values of the argument `form` of `Robot.export`, with a short description.
+#: The argument `form` of `Robot.export` has these values.
 FORMS = {"tree": "the URDF's links", "dh": "its Denavit-Hartenberg table", "screws": "its screws"}
 #: Quantities that are exported by default.
 QUANTITIES = ("placement", "jacobian", "acceleration")
@@ -36,19 +36,13 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 def code_in(code: Code, to: str) -> Code:
     """Return the code for the language `to`: with exact constants for sympy-exact, otherwise unchanged.
 
-    Raises:
-        VerificationError: Pinocchio computes another result than the exact expressions.
+    Raise VerificationError if Pinocchio computes another result than the exact expressions.
     """
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 
 def write(code: Code, to: str) -> str:
-    """Return the text of a file in the language `to`, with its seal.
-
-    Raises:
-        UnknownNameError: the language is unknown.
-        VerificationError: as for `code_in`.
-    """
+    """Return the text of a file in the language `to`, with its seal, or raise the error of `code_in`."""
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
     return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code_in(code, to), to)))

@@ -1,10 +1,10 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
 The exported code allocates no memory and has no global variables. Each function is straight-line code. In the
-arrays of a function, successive numbers of one configuration are `L` elements apart. For one configuration, L
-is 1. For a batch, L is the number of configurations that one call computes at the same time. A compiler then
-turns each line of code into one vector instruction. The parts of a file that do not depend on the robot are
-templates in `frames/`.
+arrays of a function, successive numbers of one configuration are `L` elements apart: 1 for one configuration,
+or the number of configurations that one call computes at the same time. A compiler then turns each line of
+code into one vector instruction. The parts of a file that do not depend on the robot are templates in
+`frames/`.
 """
 
 from __future__ import annotations
@@ -23,10 +23,7 @@ _PLACE = re.compile(r"@(\w+)@")
 
 
 def write(code: Code, to: str = "c") -> str:
-    """Return the text of a C file.
-
-    If `NAME_DECLARATIONS` is defined, the file only declares its functions.
-    """
+    """Return the text of a C file, which only declares its functions if `NAME_DECLARATIONS` is defined."""
     return unit(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 
@@ -44,10 +41,7 @@ def unit(code: Code, head: str = "", main: str = "") -> str:
 
 
 def framed(name: str, /, **parts: str | int) -> str:
-    """Return a template in which each `@name@` is replaced by the text `parts[name]`.
-
-    If an inserted text contains such a `@name@`, the name is not replaced.
-    """
+    """Return a template in which each `@name@` is replaced by `parts[name]`, but not in these texts."""
     text = (_FRAMES / name).read_text(encoding="utf-8")
     return _PLACE.sub(lambda found: str(parts[found[1]]), text)
 
@@ -58,7 +52,6 @@ def literal(x: float) -> str:
 
 
 def comment(lines: Sequence[str]) -> str:
-    """Return lines of text as one C comment."""
     return "/* " + "\n".join(f" * {line}".rstrip() for line in lines)[3:] + "\n */"
 
 
@@ -87,14 +80,14 @@ def what(function: Function) -> str:
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
-def _parameters(function: Function, real: str) -> str:
+def parameters(function: Function, real: str) -> str:
     return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
 
 
 def _declarations(code: Code) -> Iterator[str]:
     yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
     for function in code.functions:
-        given = _parameters(function, f"{code.name.upper()}_REAL")
+        given = parameters(function, f"{code.name.upper()}_REAL")
         yield f"/* {what(function)} */"
         yield f"void {code.name}_{function.name}({given});"
         yield f"void {code.name}_{function.name}_batch(size_t n, {given});"
@@ -111,8 +104,8 @@ def _function(code: Code, function: Function) -> str:
         name=function.name,
         title=code.name,
         operations=function.operations,
-        given=f"({_parameters(function, 'real')})",
-        given_rest=f"{_parameters(function, 'real')})",
+        given=f"({parameters(function, 'real')})",
+        given_rest=f"{parameters(function, 'real')})",
         count=count,
         room=layout.room,
         inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",
@@ -162,10 +155,7 @@ class Layout:
         self.room = max(1, self.first + 3 * len(self.angles))
 
     def place(self, node: Node) -> int:
-        """Return the position of a value in the array `in`.
-
-        The value is an input, an angle, or the sine or cosine of an angle.
-        """
+        """Return the position in the array `in` of an input, an angle, or the sine or cosine of an angle."""
         if node.op in ("sin", "cos"):
             return self.place(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
@@ -191,7 +181,6 @@ def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
 
 
 def _computed_angles(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
-    """Yield C code that computes the angles which are not inputs themselves."""
     for node in layout.made:
         value = writer.whole(node, lambda x: at.format(layout.place(x)))
         yield f"{at.format(layout.place(node))} = {value}"
@@ -244,7 +233,6 @@ def _array(declared: str, rows: Sequence[Sequence[str]]) -> str:
 
 
 def _numbers(values: Sequence[str]) -> str:
-    """Return numbers as the text of a C list, wrapped over several lines."""
     lines, line = list[str](), "       "
     for value in values:
         if len(line) + len(value) > 108:
@@ -255,10 +243,7 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main(code: Code, *frames: str) -> str:
-    """Return the text of a program that runs the test vectors.
-
-    The arguments `frames` are names of template files, for example "check_one.c".
-    """
+    """Return a program that runs the test vectors with the templates `frames`, for example "check_one.c"."""
     checks = (_check(code, function, frame) for function in code.functions for frame in frames)
     return framed("check.c", checks="".join(checks))
 

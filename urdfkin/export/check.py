@@ -20,22 +20,22 @@ from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
 from urdfkin.system.processes import own_python
 
-#: Text that the first lines of every exported file contain.
+#: The first lines of every exported file contain this text.
 _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
-#: Suffix -> compiler and options.
+#: Compiler and options for each suffix.
 _COMPILE = {
     ".c": ("cc", "-std=c99", "-x", "c", *_STRICT),
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: The command that compiles a CUDA file for the GPU.
+#: This command compiles a CUDA file for the GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that are searched for `_MARK` and for the word UNVERIFIED.
+#: This number of characters at the start of a file is searched for `_MARK` and the word UNVERIFIED.
 _HEAD = 2000
-#: Time limit of a command, seconds. The code of a robot with a thousand joints compiles in one minute.
+#: A command ends after this time (s). The code of a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 
 
@@ -62,9 +62,7 @@ class Checked:
 def check(file: Path) -> Checked:
     """Compile or import a file that the command `export` wrote, and run the test vectors in the file.
 
-    Raises:
-        InputError: the file is not an export, or it does not run here; the message names what is missing.
-        SourceError: the file cannot be read.
+    Raise InputError if the file is not an export or does not run here, and SourceError if it cannot be read.
     """
     text = read_text(file)
     head = text[:_HEAD]
@@ -85,9 +83,7 @@ def check(file: Path) -> Checked:
                 found=file.suffix or "no suffix",
                 remedy=f"check a file with the suffix {', '.join(runs)}",
             )
-        lines = tuple(
-            line for words in run(file, text, Path(folder)) for line in words
-        )  # a copy in a separate folder
+        lines = tuple(line for words in run(file, text, Path(folder)) for line in words)
     if not lines:
         raise InputError("the file has no test vectors", where=str(file))
     return Checked(lines, all(line.startswith("good ") for line in lines), tuple(_doubts(text)))
@@ -107,15 +103,13 @@ def _doubts(text: str) -> Iterator[str]:
 
 
 def _has_gpu() -> bool:
-    """Return whether this machine has a compiler of CUDA and a GPU to run its code."""
     return shutil.which("nvcc") is not None and Path("/dev/nvidia0").exists()
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    """Compile and run a file of C, C++ or CUDA, in single and in double precision.
+    """Compile and run a file of C, C++ or CUDA, in single and in double precision, with warnings as errors.
 
-    The system's compiler treats all warnings as errors. CUDA's kernels run if there is a GPU. Without a GPU,
-    only the functions for the processor are checked.
+    CUDA's kernels run if there is a GPU. Without a GPU, only the functions for the processor are checked.
     """
     found = _MAIN.search(text)
     if found is None:
@@ -146,7 +140,6 @@ def _run_octave(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
 
 
 def _copy(text: str, place: Path) -> Path:
-    """Write the text to a new file with the path `place`, and return this path."""
     place.write_text(text, encoding="utf-8")
     return place
 

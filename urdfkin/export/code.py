@@ -21,28 +21,22 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
-#: Precedence of operators, lowest first: a sum, a change of sign, a product, and an operand that needs no
-#: brackets.
+#: A sum has the lowest precedence. An operand that needs no brackets has the highest precedence.
 _SUM, _SIGN, _PRODUCT, _ATOM = range(4)
 _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
 
 @dataclass(frozen=True)
 class Code:
-    """The functions of a frame.
+    """The functions of a frame. No name contains characters that end a comment in the exported file.
 
     Attributes:
         name: Prefix of the names of functions.
-        robot: The robot's name. A name in this class contains no characters that end a comment in the
-            exported file.
-        frame: The frame's name.
-        reference: The reference frame.
-        functions: One function for each quantity.
         coordinates: Names of the coordinates of q.
         rates: Names of the coordinates of v and a.
         joints: Names of the path's moving joints.
-        words: Identifiers in the exported code. The keys "q", "v" and "a" have a list of identifiers for the
-            numbers of the input. The key "s" has a list of identifiers for the path's joints.
+        words: Identifiers in the exported code, by "q", "v" and "a" for the numbers of the input, and by "s"
+            for the path's joints.
         about: Lines of the file's header that contain the Denavit-Hartenberg table or the screws; empty for
             code from a URDF's joints.
         vouched: The comparison with Pinocchio and the test vectors; None for code that urdfkin compiles for
@@ -73,24 +67,18 @@ class Code:
 
     @property
     def nq(self) -> int:
-        """Length of q."""
         return len(self.coordinates)
 
     @property
     def nv(self) -> int:
-        """Length of v and a."""
         return len(self.rates)
 
     def widths(self, function: Function) -> dict[str, int]:
-        """Return the length of each input of a function, by the input's letter."""
         return {letter: self.nq if letter == "q" else self.nv for letter in function.inputs}
 
     @property
     def head(self) -> list[str]:
-        """The lines of a file's header, without comment marks.
-
-        If the code is not verified, the first line says UNVERIFIED.
-        """
+        """The lines of a file's header, without comment marks; the first may say UNVERIFIED."""
         verdict, *rest = self.proof.lines
         lines = [verdict] if not self.proof.certificate.verified else []
         lines += [
@@ -121,15 +109,9 @@ def code_of(
 ) -> Code:
     """Return the code of a frame with test vectors and with the result of the comparison with Pinocchio.
 
-    Args:
-        verifier: Verifier of the robot.
-        plan_of: Function that returns the compiled tree of the joints that move the given links.
-        frame: Name of a link or joint.
-        quantities: Names of quantities.
-        reference: Reference frame of velocities, accelerations and Jacobians.
-        name: Prefix of the function names. None: the prefix consists of the names of the robot and the frame.
-        verify: As in `Robot.export`.
-        about: Text for the file's header: the Denavit-Hartenberg table or the screws.
+    `plan_of` returns the compiled tree of the joints that move the given links. By default, the prefix `name`
+    of the functions consists of the names of the robot and the frame. `about` is a text for the file's
+    header: the Denavit-Hartenberg table or the screws.
 
     Raises:
         UnknownNameError: the frame, a quantity or the reference is unknown.
@@ -151,7 +133,7 @@ def code_of(
     code = replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
 
     def exact() -> Code:
-        from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only for computer algebra
+        from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only one language needs this
 
         functions, vouched = exact_functions(
             verifier, plan_of, frame, reference, code.functions, proof, verify
@@ -169,7 +151,6 @@ def bare(
     reference: Reference,
     name: str,
 ) -> Code:
-    """Return the code of a frame without test vectors and without a comparison with Pinocchio."""
     coordinates, rates = coordinate_names(tree), rate_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
     return Code(
@@ -186,7 +167,6 @@ def bare(
 
 
 def exported() -> list[Quantity]:
-    """Return the quantities that can be exported."""
     return [row for row in recursive_quantities() if row.name in recursion.QUANTITIES]
 
 
@@ -209,12 +189,7 @@ def _rows(names: Collection[str]) -> list[Quantity]:
 class Writer:
     """Writes a function's expressions in a language in which a sum is written as a + b.
 
-    Args:
-        code: The exported code, which contains the names of inputs and joints.
-        function: A function of this code.
-        literal: Function that writes a constant.
-        sine: Whether the written code computes sines and cosines. If False, they are inputs of the written
-            code.
+    `literal` writes a constant. Without `sine`, sines and cosines are inputs of the written code.
     """
 
     def __init__(
@@ -259,7 +234,6 @@ class Writer:
         return self.code.frame if place == len(joints) else "results"
 
     def results(self) -> list[str]:
-        """Return the values of the result as text, row by row."""
         return [self.text(x) for x in self.function.results]
 
     def text(self, x: Number, level: int = _SUM) -> str:
@@ -279,15 +253,12 @@ class Writer:
         else:
             own = _LEVEL[x.op]
             left, right = x.of
-            # The brackets of a + (b + c) remain, because the check with Pinocchio adds in this order, too.
+            # The brackets of a + (b + c) keep the order of the check with Pinocchio.
             text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
         return text if own >= level else f"({text})"
 
     def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return the text of an expression that contains inputs and constants, but no other variables.
-
-        Angles are written like this, because the exported code computes angles before it assigns variables.
-        """
+        """Return an expression, such as an angle, as a text that contains only inputs and constants."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.words:

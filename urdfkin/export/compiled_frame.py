@@ -1,8 +1,7 @@
 """Compile the kinematics of one frame to machine code. This is the fastest way to compute in urdfkin.
 
-The first call of a quantity exports C code and compiles the code with the system's compiler. The result is
-compared with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is
-used.
+The first call of a quantity exports C code and compiles it with the system's compiler. The result is compared
+with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is used.
 
 The machine code is stored in a cache with checksums. The key consists of the C code, the compiler and the
 processor. The code is loaded from memory, because a file could be changed after its checksum was tested.
@@ -43,24 +42,21 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: Options for the full width of vector registers. By default, GCC uses half of the width on many processors.
+#: By default, GCC uses half of the width of vector registers on many processors.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _names = count()
 
 
 class NoCompilerError(Exception):
-    """Error if there is no C compiler, or if the compiler rejects the code; the message is the compiler's."""
+    """There is no C compiler, or the compiler rejects the code; the message is the compiler's."""
 
 
 def library(code: Code) -> ctypes.CDLL:
-    """Compile code that consists of one function, and load it as a library.
+    """Compile code that consists of one function, and load it as a library, or raise NoCompilerError.
 
-    The library's entry point is `task`. It takes an array with the fields of `KernelArgs`. It returns 0, or 1
-    if an input is not finite.
-
-    Raises:
-        NoCompilerError: there is no C compiler, or it fails.
+    The library's entry point `task` takes an array with the fields of `KernelArgs`. It returns 0, or 1 if an
+    input is not finite.
     """
     if (compiler := shutil.which("cc")) is None:
         raise NoCompilerError("cc is not installed")
@@ -131,7 +127,7 @@ def _compile(text: str, command: list[str]) -> bytes:
 
 
 def _load(data: bytes) -> ctypes.CDLL:
-    if not hasattr(os, "memfd_create"):  # macOS needs a file; it is removed after loading
+    if not hasattr(os, "memfd_create"):  # macOS needs a file
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder, f"robot{next(_names)}.so")
             library.write_bytes(data)
@@ -140,7 +136,7 @@ def _load(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its name, so every library gets a different name.
+        # The loader identifies a library by its name.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
 
 
@@ -162,12 +158,11 @@ def _processor() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
+#: This number of random configurations, the neutral one and the limits are compared with Pinocchio.
 CHECKED = 100
-#: Largest number of results of one configuration.
-#: The code stores the results of eight configurations on the stack, in at most half a megabyte.
+#: With at most this number of results, eight configurations need at most half a megabyte of the stack.
 _MOST_RESULTS = 8192
-# These are plain integers, because indexing with a member of an enumeration takes several times as long.
+# An index that is a plain integer is several times as fast as a member of an enumeration.
 _N, _OUT, _STAGE, *_PLACES = map(
     int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.STAGE, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
 )
@@ -188,8 +183,6 @@ def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
 
 
 class _Robot(Protocol):
-    """The attributes of `Robot` that the class `CompiledFrame` uses."""
-
     verifier: Verifier
 
     @property
@@ -225,7 +218,7 @@ class CompiledFrame:
         self._robot, self._tree = robot, robot.verifier.tree
         self._plan = robot.plan([self._tree.frame_link(frame)])
         self._batches: dict[str, Callable[[int], int] | None] = {}
-        # Compiled or read from the cache at the first call.
+        # The first call of each function compiles it or reads it from the cache.
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
@@ -234,7 +227,7 @@ class CompiledFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # The object contains memory addresses of this process, so unpickling creates the object again.
+        # The object contains memory addresses, so unpickling creates it again.
         return self._robot.compiled, (self.frame, self.reference)
 
     def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
@@ -324,13 +317,11 @@ class CompiledFrame:
     # -- inside --------------------------------------------------------------------------------------------
 
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
-        """Compile the function for one configuration, and call it."""
         with compiling, importing:
-            from urdfkin.compiled.machine.single import arrays_are_known, called  # noqa: PLC0415  loads Numba
+            from urdfkin.compiled.machine.single import arrays_are_known, called  # noqa: PLC0415  slow import
 
-        own = (
-            self._tree.floating_joints or self._plan.is_large
-        )  # the norm of a quaternion or the range of the results must be checked
+        # The norm of a quaternion or the range of the results must be checked.
+        own = self._tree.floating_joints or self._plan.is_large
         if own or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None
         row = QUANTITIES[name]
@@ -340,14 +331,11 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # only for the first call, so that later calls stay fast
+            warn_of_degrees(self._tree, q)  # later calls stay fast without this check
         return found
 
     def _machine_code(self, row: Quantity) -> Any:
-        """Return the compiled C function of a quantity, or None without a C compiler.
-
-        The function is compiled and checked only once.
-        """
+        """Return the compiled C function of a quantity, or None without a C compiler."""
         with _compiling:
             if row.name not in self._batches:
                 self._batches[row.name] = self._make(row)
@@ -376,14 +364,13 @@ class CompiledFrame:
     def _compute_batch(
         self, name: str, inputs: Sequence[Given], out: FloatArray | None, threads: int | None
     ) -> FloatArray:
-        """Compute a batch, in parts for several threads."""
         row = QUANTITIES[name]
         if (made := self._machine_code(row)) is None:
             return self._robot.compute(
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # If an input is not finite, the code below this block raises an error with the number's position.
+            # For an input that is not finite, the code below raises an error with its position.
             with suppress(NotFiniteError):
                 self._run(made, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])
@@ -400,9 +387,8 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        For such arrays the general conversion of arguments (`Call`) is skipped. This conversion would take a
-        tenth of the time of 100,000 accelerations. The reason is that each large batch removes the
-        conversion's code from the processor's caches.
+        For such arrays the general conversion of arguments (`Call`) is skipped. It would take a tenth of the
+        time of 100,000 accelerations, because each large batch removes its code from the processor's caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(

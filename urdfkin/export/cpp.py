@@ -1,15 +1,15 @@
 """Write a header with function templates for any number type: for C++11, or for CUDA.
 
-Examples are `double`, `float`, and the types of libraries for automatic differentiation. CUDA's header has
-the same functions for the host and the device. The header for CUDA also has a kernel for batches, and C
-functions that start the kernel.
+The number types are `double`, `float`, and the types of libraries for automatic differentiation. The header
+for CUDA has the same functions for the host and the device. It also has a kernel for batches, and C functions
+that start the kernel.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from urdfkin.export.c import comment, framed, main, vectors, what
+from urdfkin.export.c import comment, framed, main, parameters, vectors, what
 from urdfkin.export.code import Code, Writer
 from urdfkin.export.function import Function
 
@@ -81,15 +81,10 @@ def _cuda(code: Code) -> str:
     )
 
 
-def _given(function: Function, real: str) -> str:
-    return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
-
-
 def _entries(code: Code, function: Function) -> list[str]:
-    """Return the declarations of a function's C entry points, in double and in single precision."""
     name = f"{code.name}_{function.name}"
     return [
-        f"int {name}_{real}(size_t n, {_given(function, real)}, struct CUstream_st *stream)"
+        f"int {name}_{real}(size_t n, {parameters(function, real)}, struct CUstream_st *stream)"
         for real in ("double", "float")
     ]
 
@@ -104,7 +99,7 @@ def _kernel(code: Code, function: Function) -> str:
     return framed(
         "kernel.cuh",
         name=function.name,
-        given=_given(function, "T"),
+        given=parameters(function, "T"),
         count=len(function.results),
         own=", ".join(f"own_{x}[{max(1, width)}]" for x, width in widths.items()),
         reads="\n".join(
@@ -119,7 +114,7 @@ def _kernel(code: Code, function: Function) -> str:
 def _function(code: Code, function: Function, before: str = "") -> Iterator[str]:
     writer = Writer(code, function, lambda x: f"T({x!r})")
     yield f"\n/* {what(function)}, row by row; {function.operations} operations. */"
-    yield f"template <class T> {before}void {function.name}({_given(function, 'T')})\n{{"
+    yield f"template <class T> {before}void {function.name}({parameters(function, 'T')})\n{{"
     yield "    using std::cos;\n    using std::sin;\n    using std::sqrt;"
     yield from (f"    (void){letter};" for letter in function.inputs)
     for node in writer.given:

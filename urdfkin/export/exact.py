@@ -2,15 +2,13 @@
 
 The constants are the URDF's decimals as fractions. For example, the angle 1.5707963267948966 becomes pi/2. An
 angle becomes a multiple of pi/12 if rounding this multiple to a double gives the same number as rounding the
-angle. An irrational square root is not computed, but remains an expression. The same applies to the sine and
-cosine of an angle that is not a multiple of pi/2. The recursion is that of `urdfkin.export.recursion`.
+angle. Irrational square roots, sines and cosines remain expressions.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -21,17 +19,15 @@ from urdfkin.compiled.plan import Column, CompiledTree, Geometry
 from urdfkin.dh.units import fraction_text, pi_fraction
 from urdfkin.export.expression import Graph, Node, Number
 from urdfkin.export.function import INPUTS, Function, function_of
-from urdfkin.export.proof import CHECKED, Proof
-from urdfkin.model.configuration import draw
+from urdfkin.export.proof import Proof, compared
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, Kind, enough_digits, exact, precision, read_exact
 from urdfkin.verify.verifier import Verifier
 
-#: Larger angles (rad) are not replaced by a multiple of pi. Below this angle, the distance between doubles is
-#: far smaller than the distance between multiples of pi/12.
+#: Largest angle (rad) that is replaced by a multiple of pi.
+#: Doubles below this angle are far closer to each other than multiples of pi/12.
 _LARGEST = 100.0
 #: Sine and cosine of 0, pi/2, pi and 3 pi/2.
 _RIGHT = ((0, 1), (1, 0), (0, -1), (-1, 0))
@@ -50,14 +46,13 @@ class PiMultiple:
         return self.factor < other
 
     def __radd__(self, other: Number) -> Number:
-        return other.graph.sum(other, self) if isinstance(other, Node) else self  # a constant is 0
+        return other.graph.sum(other, self) if isinstance(other, Node) else self  # the constant is 0
 
 
 class ExactGraph(Graph):
-    """The expressions of a function. Their constants are exact numbers, not doubles.
+    """The expressions of a function whose constants are exact numbers, not doubles.
 
-    Attributes:
-        recognised: The angles of the URDF that were replaced by multiples of pi, and these multiples.
+    `recognised` contains the URDF's angles that were replaced by multiples of pi, and these multiples.
     """
 
     zero = 0
@@ -67,11 +62,7 @@ class ExactGraph(Graph):
         self.recognised: dict[Fraction, PiMultiple] = {}
 
     def made(self, op: str, *of: Any) -> Node:
-        """Return the node of an operation.
-
-        Raises:
-            TypeError: an operand is a double.
-        """
+        """Return the node of an operation; raise TypeError if an operand is a double."""
         if any(isinstance(x, float) for x in of):
             raise TypeError(f"an operand of {op} is a double")
         return super().made(op, *of)
@@ -82,7 +73,6 @@ class ExactGraph(Graph):
         return x if factor is None else self.recognised.setdefault(x, PiMultiple(factor))
 
     def sine_cosine(self, x: Number) -> tuple[Number, Number]:
-        """Return the sine and the cosine of an angle, which may be a constant."""
         if not isinstance(x, Node | PiMultiple):
             x = self.angle(Fraction(x))
         if x == 0:
@@ -92,7 +82,6 @@ class ExactGraph(Graph):
         return self.made("sin", x), self.made("cos", x)
 
     def root(self, x: Number) -> Number:
-        """Return the square root of x, which may be a constant."""
         if not isinstance(x, Node):
             x = Fraction(x)
             root = Fraction(math.isqrt(x.numerator), math.isqrt(x.denominator))
@@ -106,12 +95,7 @@ def exact_plan(
 ) -> CompiledTree:
     """Return a link's compiled tree with the exact constants of the URDF text.
 
-    Args:
-        graph: The graph in which the exact constants are created.
-        text: The URDF text.
-        tree: The robot's joints, which were read from the URDF text.
-        plan: The compiled tree of the link.
-        link: Index of the link.
+    The joints of `tree` were read from the URDF text.
     """
     graph.place = -1
     eq, path = graph.chapter, tree.path(link)
@@ -193,12 +177,10 @@ class ExactProof(Proof):
 
     @property
     def evaluated(self) -> str:
-        """Precision of the expressions that were compared with the oracle."""
         return f"at {DIGITS} digits"
 
     @property
     def constants(self) -> str:
-        """Description of the constants."""
         change = f", changed by at most {self.most:.1e} rad" if self.angles else ""
         return (
             f"Constants are the URDF's decimals; {self.angles} different angles are multiples of pi{change}"
@@ -216,39 +198,22 @@ def exact_functions(
 ) -> tuple[tuple[Function, ...], ExactProof]:
     """Return functions with exact constants, and the result of their comparison with Pinocchio.
 
-    The expressions are evaluated at fifty digits and compared with Pinocchio. The test vectors are the same
-    as for the functions with constants in double precision.
-
-    Args:
-        verifier: Verifier of the robot.
-        plan_of: Function that returns the compiled tree of the joints that move the given links.
-        frame: Name of a link or joint.
-        reference: Reference frame.
-        functions: The functions with constants in double precision.
-        proof: The checks of these functions: test vectors and the comparison with Pinocchio.
-        verify: As in `Robot.export`.
-
-    Raises:
-        VerificationError: Pinocchio computes another result.
+    The expressions are evaluated at fifty digits and compared with Pinocchio; `proof` has the test vectors of
+    the same functions with constants in double precision. Raise VerificationError if Pinocchio computes
+    another result.
     """
-    tree, checker = verifier.tree, copy(verifier)  # with a separate ledger
-    link, found, angles = tree.frame_link(frame), list[Function](), dict[Fraction, PiMultiple]()
-    drawn = draw(tree, CHECKED, np.random.default_rng(0), with_special=True)
+    tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):
         for other in functions:
             graph = ExactGraph()
-            plan = exact_plan(graph, verifier.text, tree, other.plan, link)
+            plan = exact_plan(graph, verifier.text, tree, other.plan, tree.frame_link(frame))
             found.append(function_of(plan, other.quantity, reference, graph))
             angles |= graph.recognised
         most = max((float(abs(ball(x) - ball(y)).upper()) for x, y in angles.items()), default=0.0)
-    for function in found:
-        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
-        call = Call(tree, plan_of, frame, reference, None, inputs)
-        values = _evaluated(function, (call.q, *call.rates))
-        checker.check(function.quantity, call, values, bool(checker.wanted(verify)))
+    certificate = compared(verifier, plan_of, frame, reference, found, _evaluated, verify)
     fields = {name: getattr(proof, name) for name in ("sha256", "urdfkin", "vectors", "lock")}
     return tuple(found), ExactProof(
-        **fields, certificate=checker.certificate(), single={}, angles=len(angles), most=most
+        **fields, certificate=certificate, single={}, angles=len(angles), most=most
     )
 
 

@@ -1,6 +1,4 @@
-"""Define symbolic numbers.
-
-Arithmetic with these numbers creates a graph of expressions. urdfkin writes code from this graph.
+"""Define symbolic numbers, whose arithmetic creates a graph of expressions for exported code.
 
 The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
 The graph simplifies each expression when it is created. Constants are Python floats, so an operation on
@@ -35,8 +33,7 @@ class Node:
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
         of: The operands, which are nodes and constants. For an input such as q[3], `of` contains the index 3.
-        index: Number of the expression in the order of creation. An expression is created after its operands,
-            so its number is larger than theirs.
+        index: Number of the expression in the order of creation; the operands have smaller numbers.
         place: Number of the joint on the path at which the recursion created this expression.
         equation: Numbers of the textbook's equation that this expression belongs to, for example "7.127"; ""
             if there is no number.
@@ -78,7 +75,6 @@ class Node:
 
     @property
     def operands(self) -> list[Node]:
-        """The operands that are not constants."""
         return [x for x in self.of if isinstance(x, Node)]
 
 
@@ -88,11 +84,10 @@ class Graph:
     Attributes:
         place: Index of the current step of the recursion.
         equation: Numbers of the current equation.
-        chapter: The textbook's equations as functions. Each function records its equation numbers in the
-            nodes that it creates.
+        chapter: The textbook's equations as functions that record their equation numbers in new nodes.
     """
 
-    #: The constant that replaces expressions such as 0 x and x - x.
+    #: This constant replaces expressions such as 0 x and x - x.
     zero: float = 0.0
 
     def __init__(self) -> None:
@@ -101,7 +96,6 @@ class Graph:
         self.chapter: Any = bound(made=self._record_numbers)
 
     def input(self, letter: str, place: int) -> Node:
-        """Return the node for one element of q, v or a, for example q[3]."""
         return self.made(letter, place)
 
     def made(self, op: str, *of: Any) -> Node:
@@ -118,11 +112,10 @@ class Graph:
         return self.made("sin", x), self.made("cos", x)
 
     def root(self, x: Number) -> Number:
-        """Return the square root of x."""
+        """Return the square root of x, which may be a constant."""
         return self.made("sqrt", x) if isinstance(x, Node) else math.sqrt(x)
 
     def sum(self, x: Number, y: Number) -> Number:
-        """Return x + y."""
         if _is(x, 0.0) or _is(y, 0.0):
             return y if _is(x, 0.0) else x
         if (positive := _without_minus(y)) is not None:
@@ -132,7 +125,6 @@ class Graph:
         return self.made("+", *_in_order(x, y))
 
     def difference(self, x: Number, y: Number) -> Number:
-        """Return x - y."""
         if x is y or _is(y, 0.0):
             return self.zero if x is y else x
         if _is(x, 0.0):
@@ -146,7 +138,6 @@ class Graph:
         return self.made("-", x, y)
 
     def product(self, x: Number, y: Number) -> Number:
-        """Return the product of x and y."""
         if _is(x, 0.0) or _is(y, 0.0):
             return self.zero
         for one, other in ((x, y), (y, x)):
@@ -191,16 +182,12 @@ def _without_minus(x: Number) -> Number:
 
 
 def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
-    """Return two operands in a fixed order, so that x + y and y + x are the same node.
-
-    The order is: constants first, then nodes in the order of their creation.
-    """
+    """Return constants, then nodes in the order of creation: x + y and y + x are the same node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 
 
 def needed(results: Sequence[Number]) -> list[Node]:
-    """Return all expressions that some results need, in the order in which they were created."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:

@@ -36,10 +36,7 @@ def code_of_robot(
     name: str | None = None,
     verify: bool | None = None,
 ) -> Code:
-    """Return the exported code of a robot's frame, with the record of its check.
-
-    The arguments and the errors are those of `Robot.export`.
-    """
+    """Return the exported code of a robot's frame; the arguments and errors are those of `Robot.export`."""
     if form not in FORMS:
         raise UnknownNameError("form", form, FORMS)
     verify = bool(robot.verifier.wanted(verify))
@@ -61,15 +58,8 @@ def code_of_chain(
     """Return the exported code of a chain's last frame, with test vectors and the comparison with Pinocchio.
 
     The code has one step for each row of the table, or for each screw. Results are in the axes of the chain's
-    base.
-
-    Args:
-        chain: A table, or a product of exponentials.
-        quantities: As in `Robot.export`. None: as in `Robot.export`. If no joint moves, only the placement is
-            exported.
-        reference: As in `Robot.export`.
-        name: As in `Robot.export`.
-        verify: Whether to compare the code with Pinocchio.
+    base. The arguments are those of `Robot.export`. By default, a chain without moving joints exports only
+    the placement.
 
     Raises:
         InputError: a quantity cannot be exported.
@@ -80,7 +70,7 @@ def code_of_chain(
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UrdfWarning)  # the user does not see this intermediate URDF
+        warnings.simplefilter("ignore", UrdfWarning)  # the user does not see this URDF
         robot = hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))

@@ -1,6 +1,4 @@
-"""Define a function of the exported code: its inputs, its statements and its results.
-
-A function computes one quantity of one frame.
+"""Define a function of the exported code, which computes one quantity of one frame.
 
 The exported code assigns an expression to a variable if it is used more than once, or if it is a number of a
 link's state. Sines, cosines, roots and quotients are also assigned to variables. A long expression is split
@@ -27,7 +25,7 @@ from urdfkin.verify.quantities import Quantity
 
 #: Letters of the inputs.
 INPUTS = ("q", "v", "a")
-#: Operations whose result the exported code always assigns to a variable.
+#: The exported code always assigns the result of these operations to a variable.
 _ALWAYS = ("sin", "cos", "sqrt", "/")
 #: Largest number of operations in a statement.
 _LONGEST = 12
@@ -38,8 +36,6 @@ class Function:
     """Straight-line code for one quantity.
 
     Attributes:
-        quantity: The quantity that the function computes, for example the placement.
-        reference: The reference frame.
         plan: The compiled tree of the joints from the base to the frame.
         results: The numbers of the result, row by row. Each number is a constant or an expression.
     """
@@ -51,7 +47,6 @@ class Function:
 
     @property
     def name(self) -> str:
-        """The quantity's name as an identifier."""
         return self.quantity.method
 
     @property
@@ -61,7 +56,6 @@ class Function:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The shape of the result."""
         return self.quantity.own_shape(self.plan.nv)
 
     @cached_property
@@ -76,13 +70,11 @@ class Function:
 
     @cached_property
     def angles(self) -> list[Node]:
-        """The angles whose sine or cosine the function computes."""
         found = (node.of[0] for node in self.nodes if node.op in ("sin", "cos"))
         return list(dict.fromkeys(found))
 
     @cached_property
     def statements(self) -> list[Node]:
-        """The expressions that the code assigns to variables, in the order of the assignments."""
         uses = Counter[Node]()
         for value in self.results:
             if isinstance(value, Node):
@@ -101,10 +93,7 @@ class Function:
         return found
 
     def within(self, leaves: Collection[str]) -> set[Node]:
-        """Return the expressions that the results need.
-
-        The operands of an operation in `leaves` are not included.
-        """
+        """Return the expressions that the results need, without the operands of operations in `leaves`."""
         waiting, found = [x for x in self.results if isinstance(x, Node)], set[Node]()
         while waiting:
             if (node := waiting.pop()) not in found:
@@ -145,10 +134,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return x for an expression -x; return other expressions unchanged.
-
-    The exported code never assigns -x to a variable.
-    """
+    """Return x for an expression -x, which is never assigned to a variable; return others unchanged."""
     return node.of[0] if node.op == "neg" else node
 
 
@@ -157,11 +143,8 @@ def function_of(
 ) -> Function:
     """Return the function that computes a quantity for the only frame of a compiled tree.
 
-    Args:
-        plan: The compiled tree of the joints from the base to the frame.
-        quantity: A quantity that can be exported.
-        reference: The reference frame.
-        graph: The graph in which the tree's exact constants were created. None: the constants are doubles.
+    The compiled tree contains the joints from the base to the frame. `graph` is the graph in which the tree's
+    exact constants were created. Without it, the constants are doubles.
     """
     graph = graph or Graph()
 
@@ -176,7 +159,7 @@ def function_of(
         for letter in INPUTS
     ]
     results = recursion.QUANTITIES[quantity.name](plan, kind, inputs, reference)
-    # -0.0 + 0.0 is 0.0
+    # The sum with 0.0 turns -0.0 into 0.0.
     return Function(
         quantity, reference, plan, tuple(x + 0.0 if isinstance(x, int | float) else x for x in results)
     )

@@ -38,7 +38,6 @@ _RESULTS = {
 
 
 def write(code: Code, to: str = "latex") -> str:
-    """Return the text of a complete LaTeX document."""
     lines = [f"% {line}".rstrip() for line in code.head]
     lines += [
         r"\documentclass{article}",

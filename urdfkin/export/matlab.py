@@ -1,7 +1,4 @@
-"""Write a file for MATLAB and Octave.
-
-The file has one main function, which returns all other functions, including the check.
-"""
+"""Write a file for MATLAB and Octave. Its main function returns all other functions, including the check."""
 
 from __future__ import annotations
 
@@ -34,7 +31,6 @@ end
 
 
 def write(code: Code, to: str = "matlab") -> str:
-    """Return the text of a file `NAME_kinematics.m`."""
     name = f"{code.name}_kinematics"
     head = [
         *code.head,

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import plain
 
-#: Largest length of an identifier without a prefix. With a prefix, MATLAB allows 63 characters.
+#: An identifier has at most this length without a prefix. With a prefix, MATLAB allows 63 characters.
 _LONGEST = 40
 _LONGEST_SHOWN = 80
 
@@ -27,9 +27,7 @@ def safe(name: str) -> str:
 
 
 def all_safe(names: Iterable[str]) -> list[str]:
-    """Return a different identifier for each name.
-
-    The identifiers differ even in a language that ignores case.
+    """Return a different identifier for each name, even for a language that ignores case.
 
     >>> all_safe(["a b", "a/b", "A_b_2"])
     ['a_b', 'a_b_2', 'A_b_2_2']

@@ -1,11 +1,9 @@
 """Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
-The expressions are evaluated exactly as they are printed, and the results are compared with Pinocchio's. When
-a user runs the file, its test vectors check the file and also the user's compiler, language version and
+When a user runs the file, its test vectors check the file and also the user's compiler, language version and
 libraries. The test vectors contain true values at fifty digits, computed from the URDF's decimals. For each
-true value they also contain a bound on the rounding errors of a correct computation. The unit of the bound is
-the eps of the file's precision. The inputs are single-precision numbers, so they are equal in single and in
-double precision.
+true value they also contain a bound on the rounding errors of a correct computation, in eps of the file's
+precision. The inputs are single-precision numbers, so they are equal in single and in double precision.
 """
 
 from __future__ import annotations
@@ -42,9 +40,9 @@ from urdfkin.verify.exact.numbers import (
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.verifier import Verifier
 
-#: Number of random configurations compared with Pinocchio, besides the neutral one and the limits.
+#: This number of random configurations, the neutral one and the limits are compared with Pinocchio.
 CHECKED = 100
-#: Number of test vectors: configurations with results at fifty digits.
+#: Number of test vectors.
 VECTORS = 4
 
 
@@ -54,10 +52,10 @@ class Vector:
 
     Attributes:
         inputs: q, v and a.
-        results: For each quantity, the true values as decimal numbers, row by row.
-        within: For each quantity, the error bound of each number, in eps.
-        single: For each quantity, the error bound of each number in single precision, in eps = 2^-23. The
-            bound is 0.0 if a number is beyond the range of single precision.
+        results: The true values of each quantity as decimal numbers, row by row.
+        within: The error bound of each number, in eps, by quantity.
+        single: The same in single precision, in eps = 2^-23; 0.0 if a number is beyond the range of single
+            precision.
     """
 
     inputs: tuple[list[float], ...]
@@ -73,10 +71,8 @@ class Proof:
     Attributes:
         sha256: SHA-256 of the URDF's text.
         urdfkin: Version of urdfkin.
-        certificate: The certificate of the comparison of the expressions with Pinocchio.
-        vectors: The test vectors.
-        single: For each quantity, the largest bound in single precision, in multiples of eps * scale; inf if
-            a number is beyond the range of single precision.
+        single: The largest bound of each quantity in single precision, in multiples of eps * scale; inf if a
+            number is beyond the range of single precision.
         lock: Name and value of each locked joint.
     """
 
@@ -89,7 +85,6 @@ class Proof:
 
     @property
     def evaluated(self) -> str:
-        """Precision of the expressions that were compared with the oracle."""
         return "in double precision"
 
     @property
@@ -99,7 +94,6 @@ class Proof:
 
     @property
     def lines(self) -> list[str]:
-        """Lines of text for the file's header that describe the checks."""
         oracle = quiet(self.certificate.oracle)
         if not self.certificate.verified:
             reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"
@@ -141,28 +135,37 @@ def prove(
     functions: Sequence[Function],
     verify: bool | None,
 ) -> Proof:
-    """Compare functions with Pinocchio, and compute test vectors.
-
-    Raises:
-        VerificationError: Pinocchio computes another result.
-    """
-    tree = verifier.tree
-    checker = copy(verifier)  # with a separate ledger
-    drawn = draw(tree, CHECKED, np.random.default_rng(0), with_special=True)
-    for function in functions:
-        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
-        call = Call(tree, plan_of, frame, reference, None, inputs)
-        found = function.evaluated((call.q, *call.rates))
-        checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
+    """Compare functions with Pinocchio, and compute test vectors; raise VerificationError if they differ."""
+    certificate = compared(verifier, plan_of, frame, reference, functions, Function.evaluated, verify)
     vectors, single = _vectors(verifier, plan_of, frame, reference, functions)
     return Proof(
         sha256=hashlib.sha256(verifier.text.encode()).hexdigest(),
         urdfkin=own_version(),
-        certificate=checker.certificate(),
+        certificate=certificate,
         vectors=vectors,
         single=single,
         lock=verifier.origin.lock,
     )
+
+
+def compared(
+    verifier: Verifier,
+    plan_of: Callable[[Sequence[int]], CompiledTree],
+    frame: str,
+    reference: Reference,
+    functions: Sequence[Function],
+    evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
+    verify: bool | None,
+) -> Certificate:
+    """Compare the results of `evaluate` with Pinocchio, or raise VerificationError."""
+    checker = copy(verifier)  # the copy has a separate ledger
+    drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
+    for function in functions:
+        inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
+        call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
+        found = evaluate(function, (call.q, *call.rates))
+        checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
+    return checker.certificate()
 
 
 def _vectors(
@@ -172,7 +175,7 @@ def _vectors(
     reference: Reference,
     functions: Sequence[Function],
 ) -> tuple[tuple[Vector, ...], dict[str, float]]:
-    """Return the test vectors, and for each quantity the largest bound in single precision."""
+    """Return the test vectors, and the largest bound of each quantity in single precision."""
     tree = verifier.tree
     link = tree.frame_link(frame)
     drawn = draw(tree, VECTORS, np.random.default_rng(1), with_special=False)
@@ -208,10 +211,9 @@ def _single(x: FloatArray) -> FloatArray:
 
 
 def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatArray, FloatArray]:
-    """Return the error bounds of a function's results, and the scales of these bounds, as arrays.
+    """Return the error bounds k * scale of a function's results, in eps, and the scales.
 
-    The first array (n, numbers) contains k * scale, because an error bound is k * scale * eps. The second
-    array (n, numbers) contains the scales.
+    Both arrays have the shape (n, numbers).
     """
     v, a = (*part.rates, None, None)[:2]
     size = against_true_values(part.plan, part.q, v, a, errors)
@@ -223,10 +225,7 @@ def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatAr
 
 
 def decimal(x: Number) -> str:
-    """Return fifty decimal digits of a number that is known as an interval, without zeros at the end.
-
-    Return 0 if the interval contains 0.
-    """
+    """Return fifty decimal digits of an interval without zeros at the end; 0 if the interval contains 0."""
     ball = exact(x)
     if ball.contains(0):
         return "0.0"
@@ -236,12 +235,12 @@ def decimal(x: Number) -> str:
 
 
 def _rounded_down(x: float) -> str:
-    """Return x with six digits, rounded down; for an x that is not finite, return 0.0."""
+    """Return x with six digits, rounded down; 0.0 for an x that is not finite."""
     return _rounded(x, 6, ROUND_FLOOR)
 
 
 def _rounded_up(x: float) -> str:
-    """Return x with seven digits, rounded up; for an x that is not finite, return 0.0.
+    """Return x with seven digits, rounded up; 0.0 for an x that is not finite.
 
     With the bound 0.0, only equal numbers are accepted. The bound must not be rounded down, because the error
     of a constant in single precision can be equal to its bound.

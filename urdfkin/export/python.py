@@ -28,19 +28,18 @@ class Dialect:
     Attributes:
         about: Description of a function's inputs and results.
         imports: Import lines. The placeholder `{}` is replaced by the functions `cos`, `sin` and `sqrt` that
-            the code uses. Lines with a placeholder are removed from code without sines, cosines and roots.
-        result: Function that yields the last lines of an exported function, which return its results.
-        values: Body of the function `_values(function, inputs)` of the exported file. `_values` returns the
+            the code uses. Lines with a placeholder are removed from code without these functions.
+        result: Yields the last lines of an exported function, which return its results.
+        values: Body of the function `_values(function, inputs)` of the exported file, which returns the
             results of an exported function for a list of configurations.
         decorator: Line with the decorator of each exported function; "" for no decorator.
-        entering: Function that returns the first lines of an exported function, for example the checks of its
-            inputs.
-        helpers: Code of helper functions that the exported functions call; "" for no helpers.
-        index: Pattern for one number of an input. The default `{}[{}]` gives, for example, `q[0]`.
+        entering: Returns the first lines of an exported function, for example the checks of its inputs.
+        helpers: Code of helper functions that the exported functions call.
+        index: Pattern for one number of an input. The default gives, for example, `q[0]`.
         given: Parameter of the exported file's self-test, with a default value; "" for no parameter.
         single: Whether the functions also compute in single precision.
-        closing: Function that returns further code, which follows the exported functions in the file.
-        after: Last lines of the exported file's self-test; "" for no such lines.
+        closing: Returns further code, which follows the exported functions in the file.
+        after: Last lines of the exported file's self-test.
         exact: Whether constants are exact.
     """
 
@@ -64,10 +63,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields lines of code.
-
-    These lines assign each result to an element of an array.
-    """
+    """Return a function that yields code which assigns each result to an element of an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -112,17 +108,13 @@ def _shapes(writer: Writer) -> list[str]:
 
 
 def _zero(writer: Writer, xp: str) -> str:
-    """Return the line of code that creates an array of zeros.
-
-    The array has the batch shape, the type and the device of the inputs.
-    """
+    """Return the line that creates zeros with the batch shape, the type and the device of the inputs."""
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
 
 
 def _demands(writer: Writer, first: str = "") -> list[str]:
-    """Return the lines of code that check the inputs."""
     return [
         f'_demand({first}"{x}", {x}, {width})' for x, width in writer.code.widths(writer.function).items()
     ]
@@ -131,8 +123,7 @@ def _demands(writer: Writer, first: str = "") -> list[str]:
 def _lengths(text: str) -> Callable[[Writer], list[str]]:
     """Return a function that returns code which checks the lengths of one configuration's inputs.
 
-    Args:
-        text: Format of the argument of ValueError, for an input `x` that needs `width` numbers.
+    `text` is a format of ValueError's argument, for an input `x` that needs `width` numbers.
     """
 
     def lines(writer: Writer) -> list[str]:
@@ -151,10 +142,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields lines of code.
-
-    These lines create an array from all results, for libraries with immutable arrays.
-    """
+    """Return a function that yields code which stacks all results, for libraries with immutable arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -202,12 +190,9 @@ def _demand(
 ) -> str:
     """Return the code of a function that checks an input.
 
-    Args:
-        wrong: Expression that is true if the numbers have another type.
-        given: Further arguments of the function.
-        numbers: Name of the accepted types.
-        array: Name of the accepted container.
-        is_array: Expression that tests for the container; "" if the input is always one.
+    The expression `wrong` is true if the numbers have another type, and `is_array` tests for the container
+    ("" if the input is always one). `given` are further arguments of the function. `numbers` and `array` name
+    the accepted types and container.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -423,10 +408,7 @@ DIALECTS = {
 
 
 def write(code: Code, to: str) -> str:
-    """Return the text of a Python module with a function for each quantity.
-
-    The module also contains a check, which `python FILE` runs.
-    """
+    """Return the text of a Python module with a function for each quantity, and a check (`python FILE`)."""
     dialect = DIALECTS[to]
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [
@@ -452,7 +434,7 @@ def _imports(code: Code, dialect: Dialect) -> str:
 
 
 def _exact(x: Number) -> str:
-    from urdfkin.export.exact import literal  # noqa: PLC0415  only for computer algebra
+    from urdfkin.export.exact import literal  # noqa: PLC0415  only computer algebra needs this module
 
     return literal(x)
 
@@ -553,11 +535,7 @@ def _check(code: Code, dialect: Dialect) -> Iterator[str]:
 
 
 def torch_module(text: str) -> Any:
-    """Return the module of the exported text of the language "torch".
-
-    Raises:
-        InputError: PyTorch is not installed.
-    """
+    """Return the module of the exported text of the language "torch"; raise InputError without PyTorch."""
     need_torch()
     scope: dict[str, Any] = {"__name__": "urdfkin_torch"}
     exec(compile(text, "<urdfkin export --to torch>", "exec"), scope)
@@ -565,6 +543,5 @@ def torch_module(text: str) -> Any:
 
 
 def need_torch() -> None:
-    """Raise InputError if PyTorch is not installed."""
     if importlib.util.find_spec("torch") is None:
         raise InputError("robot.torch needs PyTorch", found="no module torch", remedy="pip install torch")

@@ -1,11 +1,11 @@
 """Compute the forward recursion of the textbook's section 7.7 for one path, for any type of number.
 
-The recursion goes from joint to joint. At each joint, it translates along the rigid link, applies a constant
-rotation, and then applies the motion of the joint about or along z. Placements and Jacobians are computed in
-the axes of the world frame, as in the textbook. Velocities and accelerations are computed in the axes of each
-link's frame, where joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes
-of the world frame, it is then rotated joint by joint. To rotate the result needs a third fewer operations
-than to compute the rotation matrix R.
+At each joint, the recursion translates along the rigid link, applies a constant rotation, and then applies
+the motion of the joint about or along z. Placements and Jacobians are computed in the axes of the world
+frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame, where
+joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes of the world frame,
+it is then rotated joint by joint. To rotate the result needs a third fewer operations than to compute the
+rotation matrix R.
 
 `urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree.
 """
@@ -31,12 +31,10 @@ class Kind:
 
     Attributes:
         chapter: A module with the textbook's equations as functions that accept numbers of this kind.
-        sine_cosine: Function that returns sine and cosine of an angle.
-        root: Function that returns the square root.
-        entering: Function that the recursion calls at each joint, at the final frame, and before the results.
-            The argument of the function is the number of earlier calls.
-        reached: Function that the recursion calls after each joint and after the final frame. The arguments
-            of the function are the number of earlier calls and the new state.
+        entering: The recursion calls this function at each joint, at the final frame, and before the results,
+            with the number of earlier calls.
+        reached: The recursion calls this function after each joint and after the final frame, with the number
+            of earlier calls and the new state.
     """
 
     chapter: Any
@@ -49,11 +47,8 @@ class Kind:
 class TreeRecursion(Recursion):
     """The forward recursion along one path.
 
-    Args:
-        plan: The compiled tree of one frame.
-        kind: The kind of number.
-        inputs: q, v and a. An input that is not needed consists of zeros.
-        own: Whether the motion of each link is computed in the axes of the link's own frame.
+    The inputs are q, v and a; an input that is not needed consists of zeros. With `own`, the motion of each
+    link is computed in the axes of the link's own frame.
 
     Attributes:
         states: The state after each step.
@@ -113,14 +108,12 @@ class TreeRecursion(Recursion):
                 assert_never(motion)
 
     def _own_values(self, i: int) -> tuple[Number, Number, Number]:
-        """Return the value, the velocity and the acceleration of a revolute or prismatic joint."""
         (_, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return multiplier * q[at] + constant, multiplier * v[rate_at], multiplier * a[rate_at]
 
     @property
     def columns(self) -> list[Column]:
-        """The columns of the frame's Jacobian."""
         found = []
         for row, factor in zip(self.plan.columns.tolist(), self.plan.multipliers.tolist(), strict=True):
             s = self.states[row[ColumnField.STEP]]
@@ -180,10 +173,7 @@ def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Refere
 
 
 def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the derivative of each Jacobian entry with respect to each coordinate.
-
-    The terms are those of equation 7.126, the time derivative of the Jacobian.
-    """
+    """Return the derivative of each Jacobian entry with respect to each coordinate (the terms of 7.126)."""
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
     for of, by, factor, six in path.hessian(path.end, path.columns, reference):
@@ -193,7 +183,7 @@ def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -
 
 
 def _recursion(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> TreeRecursion:
-    # The reference WORLD needs the position p, which is computed in the axes of the world frame.
+    # The reference WORLD needs the position p, which is computed in world axes.
     return TreeRecursion(plan, kind, inputs, own=not reference.at_world)
 
 
@@ -202,7 +192,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
         case Reference.LOCAL_WORLD_ALIGNED:
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
-        case Reference.LOCAL | Reference.WORLD:  # the vectors are already in the axes of this frame
+        case Reference.LOCAL | Reference.WORLD:  # the vectors are already in these axes
             pass
         case _:
             assert_never(reference)
@@ -213,7 +203,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-#: For each quantity by its name: the function that computes it.
+#: Each quantity has a function that computes it.
 QUANTITIES: dict[str, Callable[[CompiledTree, Kind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,

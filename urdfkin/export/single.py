@@ -1,12 +1,10 @@
 """Bound the rounding errors of an exported function in single precision, for each number of its result.
 
-The code in a file is a list of operations. Each operation and each constant has a rounding error. To first
-order in eps, the error of a result is a sum over the operations and constants. The error of the result caused
-by one operation is the operation's rounding error times the derivative of the result with respect to the
-operation. The same is true for a constant. The bound is the sum of the absolute values of these products. One
-backward pass over the operations computes the derivatives of all results.
-
-`urdfkin.kinematics.roundings` derives the error of one operation.
+Each operation and each constant of the code has a rounding error, which `urdfkin.kinematics.roundings`
+derives. To first order in eps, the error of a result is a sum over the operations and constants. The error of
+the result caused by one operation is the operation's rounding error times the derivative of the result with
+respect to the operation. The same is true for a constant. The bound is the sum of the absolute values of
+these products. One backward pass over the operations computes the derivatives of all results.
 """
 
 from __future__ import annotations
@@ -26,9 +24,9 @@ from urdfkin.kinematics.roundings import (
 )
 from urdfkin.model.tree import FloatArray
 
-#: Number of results whose derivatives are computed in one backward pass. A larger number needs more memory.
+#: One backward pass computes the derivatives of at most this number of results, which limits the memory.
 _TOGETHER = 512
-#: For each operation, the derivatives of its value with respect to its operands.
+#: These functions return the derivatives of an operation's value with respect to its operands.
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
     "+": lambda value, x, y: (1.0, 1.0),
     "-": lambda value, x, y: (1.0, -1.0),
@@ -45,12 +43,9 @@ _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
 def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
     """Return the bounds (n, results) on the errors in single precision, in eps = 2^-23.
 
-    The bounds do not include the rounding errors of the code's constants in double precision. A bound is inf
-    if a number that the code computes is beyond the range of single precision.
-
-    Args:
-        function: The function.
-        inputs: q (n, nq), v and a (n, nv), which are single-precision numbers.
+    The inputs q (n, nq), v and a (n, nv) are single-precision numbers. The bounds do not include the rounding
+    errors of the code's constants in double precision. A bound is inf if a number that the code computes is
+    beyond the range of single precision.
     """
     value = function.values(inputs)
     found = np.zeros((len(inputs[0]), len(function.results)))
@@ -65,10 +60,9 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def reach(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives, with respect to x, of the results with indices `columns`.
+        """Add `slope` to the derivatives of the results `columns` with respect to x.
 
-        If x is a constant, add its rounding error, multiplied by `slope`, to the bounds of these results
-        instead.
+        For a constant x, add its rounding error, multiplied by `slope`, to the bounds of these results.
         """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant(x)
@@ -92,10 +86,7 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
 
 
 def _own(node: Node, x: FloatArray) -> FloatArray:
-    """Return the rounding error (n,) of one operation with exact operands, in eps.
-
-    The array x contains the results of the operation for n configurations.
-    """
+    """Return the rounding error (n,) of one operation with exact operands and results x (n,), in eps."""
     size = np.abs(x)
     if node.op in INPUTS:
         error = np.zeros_like(size)

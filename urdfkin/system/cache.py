@@ -1,13 +1,12 @@
 """Store results in a cache on disk, with a checksum in each file.
 
-The name of a cache folder contains a digest of the source files, so urdfkin uses another folder after a
-source file changes. urdfkin later executes or unpickles cached files. A file of another user could therefore
-run any code. For this reason, this module uses a folder only if no other user can write to it. A folder that
-urdfkin has not used for a month is deleted.
+urdfkin later executes or unpickles cached files, so another user's file could run any code. For this reason,
+a folder is used only if no other user can write to it. Its name contains a digest of the source files, so a
+changed source file leads to another folder. A folder that urdfkin has not used for a month is deleted.
 
-`put` writes a file with a checksum, and `get` verifies it. A truncated or corrupted file could crash the
-process or compute a wrong result, so it is reported and replaced. The checksum includes the name of the file
-and the name of its folder. Therefore, `get` detects a renamed file, which could belong to another robot.
+A truncated or corrupted file could crash the process or compute a wrong result, so it is reported and
+replaced. The checksum includes the names of the file and its folder. Therefore, `get` detects a renamed file,
+which could belong to another robot.
 """
 
 from __future__ import annotations
@@ -30,13 +29,11 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 
-#: Version of the checksum. Each version of the checksum uses other folders, because the digest in a folder's
-#: name includes this version.
+#: Version of the checksum. The digest in a folder's name includes this version.
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 _USED = ".used"
-#: User ids that may own the parent folders: 0 (root) and 65534. In a container, the root user of the host may
-#: have the id 65534.
+#: Root, and the host's root user in some containers, may own the parent folders.
 _TRUSTED = (0, 65534)
 
 
@@ -47,16 +44,9 @@ class CacheWarning(UserWarning):
 def kept_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | None = None) -> Path | None:
     """Return a cache folder that only this user can write to; create it if it does not exist.
 
-    Args:
-        kind: Kind of the cached files. The folder's name begins with this word.
-        sources: Files from which the cached files are computed. The digest in the folder's name includes the
-            contents of these files.
-        texts: Texts that also determine the cached files, for example options. The digest in the folder's
-            name includes them.
-        root: The parent folder; None for the user's cache folder.
-
-    Returns:
-        The folder; None, with a `CacheWarning`, if no such folder can be used.
+    The folder's name begins with `kind`. Its digest includes the contents of the files `sources` and the
+    `texts`, for example options. The default of `root` is the user's cache folder. If no such folder can be
+    used, the function issues a `CacheWarning` and returns None.
     """
     digest = hashlib.sha256("\n".join([_CHECKSUM_VERSION, *texts]).encode())
     for source in sources:
@@ -69,7 +59,7 @@ def kept_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | No
         if (reason := _unsafe_reason(folder)) is not None:
             say_once(f"the cache is not used: {reason}")
             return None
-    except (OSError, RuntimeError) as error:  # RuntimeError: a loop of symbolic links
+    except (OSError, RuntimeError) as error:  # a loop of symbolic links raises RuntimeError
         reason = getattr(error, "strerror", None) or str(error)
         say_once(f"the cache cannot be written in {root}: {reason}; set XDG_CACHE_HOME to another folder")
         return None
@@ -92,8 +82,7 @@ _warned: set[str] = set()
 def _unsafe_reason(folder: Path) -> str | None:
     """Return the reason why another user could have written to a folder; None if this is impossible.
 
-    A user who can write to a parent folder can replace the folder, unless the parent has the sticky bit, as
-    /tmp has.
+    If a user can write to a parent folder without the sticky bit, this user can replace the folder.
     """
     me = os.geteuid()
     for place in (folder, *folder.parents):
@@ -118,7 +107,6 @@ def _is_private(group: int) -> bool:
 
 
 def _delete_unused(root: Path, kind: str) -> None:
-    """Delete the user's cache folders of one kind that urdfkin has not used for a month."""
     for mark in root.glob(f"{kind}-*/{_USED}"):
         with contextlib.suppress(OSError):
             found = mark.stat()
@@ -145,10 +133,7 @@ def put(place: Path, data: bytes) -> None:
 
 
 def get(place: Path) -> bytes | None:
-    """Return the content of a file that `put` wrote, or None.
-
-    The result is None if the file is missing, or, with a warning, if the file is damaged.
-    """
+    """Return the content of a file that `put` wrote; None if it is missing or, with a warning, damaged."""
     try:
         content = read_if_there(place, MOST_DATA)
     except SourceError as error:
@@ -171,5 +156,5 @@ def _checksum(place: Path, data: bytes) -> bytes:
 
 
 def report_damaged(place: Path, reason: str) -> None:
-    """Warn that a cached file is damaged. The caller must compute the content again and replace the file."""
+    """Warn that a cached file is damaged; the caller computes the content again and replaces the file."""
     say_once(f"{place} is damaged and is computed again: {reason}")

@@ -1,8 +1,7 @@
-"""Types of JSON documents, their common header, their schemas, and functions that read and write them.
+"""JSON documents: their common header, their schemas, and functions that read and write them.
 
-A `Layout` describes one kind of document, for example a certificate. A `TypedDict` defines the entries of the
-document. urdfkin generates the JSON Schema from this `TypedDict`, and checks documents from files against it.
-`plain` turns results into documents.
+A `TypedDict` defines the entries of a document. Its JSON Schema is generated from this `TypedDict`, and
+documents from files are checked against it. `plain` turns results into documents.
 """
 
 from __future__ import annotations
@@ -24,12 +23,10 @@ _T = TypeVar("_T")
 
 
 def says(text: str) -> Meta:
-    """Return the description of an entry for the schema."""
     return Meta(description=text)
 
 
 def of_length(n: int) -> Meta:
-    """Return the JSON Schema constraint "this list has exactly n entries"."""
     return Meta(min_length=n, max_length=n)
 
 
@@ -77,15 +74,13 @@ class Header(TypedDict):
 
 @dataclass(frozen=True, slots=True)
 class Layout(Generic[_T]):
-    """A kind of document.
+    """A kind of document, for example a certificate.
 
     Attributes:
         name: The value of the entry "schema" in each document of this kind: a name, a slash and a version.
-        type: The type of the document.
         verdicts: The possible verdicts; empty if the document has no header.
         made_by: The urdfkin command that writes documents of this kind.
-        is_open: Whether a document may have entries that `type` does not define, for example entries of a
-            later version of urdfkin.
+        is_open: Whether a document may have other entries, for example of a later version of urdfkin.
     """
 
     name: str
@@ -114,28 +109,13 @@ class Layout(Generic[_T]):
         return head | whole | {"title": self.name, "$defs": parts}
 
     def schema_text(self) -> str:
-        """Return the JSON Schema as the text of a file."""
         return json.dumps(self.schema(), indent=2) + "\n"
 
     def read(self, path: Path) -> _T:
-        """Read a document from a file.
-
-        Raises:
-            SourceError: The file cannot be read.
-            InputError: The file is not JSON, or `checked` refuses the content of the file.
-        """
         return self.checked(read_json(path), str(path))
 
     def checked(self, data: object, where: str) -> _T:
-        """Check the content of a JSON file, and return it as a document of this layout.
-
-        Args:
-            data: The content of the file.
-            where: The file.
-
-        Raises:
-            InputError: The data has another layout or version, or does not conform to this layout.
-        """
+        """Return the data of the file `where` as a document, or raise InputError if they do not conform."""
         self._demand_name(data, where)
         try:
             document = typed(data, self.type)
@@ -149,7 +129,6 @@ class Layout(Generic[_T]):
         return document
 
     def _demand_name(self, data: object, where: str) -> None:
-        """Raise InputError if data has another layout, or another version of this layout."""
         found = data.get("schema") if isinstance(data, dict) else None
         if found == self.name:
             return
@@ -191,12 +170,7 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Convert a result to dicts, lists, texts and numbers.
-
-    The function `typed` restores the result from them.
-
-    Infinite numbers stay infinite.
-    """
+    """Convert a result to dicts, lists, texts and numbers, from which `typed` restores it. Infinity stays."""
     return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
 
 
@@ -221,18 +195,12 @@ def plain(value: Any) -> Any:
 
 
 def read_json(path: Path) -> object:
-    """Read a JSON file.
-
-    Raise SourceError if the file cannot be read, and InputError if the content is not JSON.
-    """
+    """Read a JSON file; raise SourceError if it cannot be read, and InputError as `parse_json` does."""
     return parse_json(read_bytes(path, MOST_DATA, pipes=True), str(path))
 
 
 def parse_json(content: bytes, where: str) -> object:
-    """Parse the content of a file.
-
-    Raise InputError if the text is not JSON, or contains a number beyond the range of doubles.
-    """
+    """Parse a file; raise InputError if it is not JSON, or has a number beyond the range of doubles."""
     try:
         return json.loads(content, parse_constant=_number, parse_float=_number)
     except (ValueError, RecursionError) as error:
@@ -240,7 +208,6 @@ def parse_json(content: bytes, where: str) -> object:
 
 
 def _number(word: str) -> float:
-    """Parse a number. Reject infinity, NaN and numbers too large for a double."""
     number = float(word)
     if not math.isfinite(number):
         raise ValueError(f"{word[:20]} is not a finite number")

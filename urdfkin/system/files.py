@@ -1,9 +1,8 @@
 """Read and write files safely, and replace parts of a text.
 
-The functions read a whole file, up to a size limit, or raise a `SourceError`. By default they accept regular
-files only: an untrusted folder may contain a link to an endless device, or a named pipe without a writer.
-A path from the caller may be a pipe, as in `urdfkin check <(xacro arm.xacro)`. Such a pipe is read with a
-timeout; Python's `open` would wait for ever.
+By default, the functions accept regular files only: an untrusted folder may contain a link to an endless
+device, or a named pipe without a writer. A path from the caller may be a pipe, as in
+`urdfkin check <(xacro arm.xacro)`. A pipe is read with a timeout; Python's `open` would wait for ever.
 """
 
 from __future__ import annotations
@@ -23,10 +22,7 @@ from urdfkin.errors import InputError, SourceError
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """A replacement of the bytes `data[start:end]` by `text`.
-
-    If `start` equals `end`, the edit is an insertion.
-    """
+    """A replacement of the bytes `data[start:end]` by `text`."""
 
     start: int
     end: int
@@ -34,13 +30,10 @@ class Edit:
 
 
 def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
-    """Return the data with all edits applied; all other bytes stay as they are.
+    """Return the data with all edits applied; raise InputError if two edits overlap.
 
     >>> edited(b"a=1 b=2", [Edit(6, 7, "3"), Edit(2, 3, "10")])
     b'a=10 b=3'
-
-    Raises:
-        InputError: two edits overlap.
     """
     parts, cursor = list[bytes](), 0
     for edit in sorted(edits, key=lambda one: (one.start, one.end)):
@@ -51,11 +44,11 @@ def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
     return b"".join([*parts, data[cursor:]])
 
 
-#: Seconds to wait for a process to open the other end of a named pipe.
+#: urdfkin waits this time (s) for a process that opens the other end of a named pipe.
 PATIENCE = 10.0
-#: Largest size in bytes of a robot, a table, a settings file or a cached file.
+#: A robot, a table, a settings file or a cached file has at most this size in bytes.
 MOST = 100_000_000
-#: Largest size in bytes of data: trajectories, samples, reports.
+#: Data (trajectories, samples, reports) have at most this size in bytes.
 MOST_DATA = 2_000_000_000
 _AT_A_TIME = 2**20
 _KINDS = {
@@ -65,15 +58,9 @@ _KINDS = {
 
 
 def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
-    """Return the content of a file.
+    """Return the content of a file of at most `most` bytes, or raise SourceError.
 
-    Args:
-        path: A regular file, or a symbolic link to a regular file.
-        most: Largest size in bytes.
-        pipes: Whether to read pipes and devices too. Use True only for a path that the user named.
-
-    Raises:
-        SourceError: the file cannot be read, is not a regular file, or is larger than `most`.
+    Use `pipes=True`, which also reads pipes and devices, only for a path that the user named.
     """
     data = read_start(path, most + 1, pipes=pipes)
     if len(data) > most:
@@ -82,10 +69,7 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
 
 
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
-    """Return the first `count` bytes of a file, or the whole file if it is shorter.
-
-    The function has the same arguments and errors as `read_bytes`.
-    """
+    """Return the first `count` bytes of a file, or the whole file if it is shorter, like `read_bytes`."""
     try:
         # Without O_NONBLOCK, opening a pipe blocks until a writer opens it.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
@@ -102,17 +86,13 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
             os.close(descriptor)
     except SourceError:
         raise
-    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+    except (OSError, ValueError) as error:  # a null character in the name raises ValueError
         reason = getattr(error, "strerror", None) or str(error)
         raise SourceError("cannot be read", where=shortened(path), found=reason) from error
 
 
 def demand_regular(path: Path) -> None:
-    """Reject a pipe, a socket or a device. A path that does not exist is not rejected; reading it fails.
-
-    Raises:
-        SourceError: the path is neither a regular file nor a folder.
-    """
+    """Raise SourceError for a pipe, a socket or a device, but not for a path that does not exist."""
     try:
         kind = path.stat().st_mode
     except (OSError, ValueError):
@@ -131,10 +111,7 @@ def _check_regular(path: Path, kind: int) -> None:
 
 
 def read_if_there(path: Path, most: int = MOST) -> bytes | None:
-    """Return the content of a file, or None if the file does not exist.
-
-    All other errors are the same as for `read_bytes`.
-    """
+    """Return the content of a file like `read_bytes`; None if the file does not exist."""
     try:
         return read_bytes(path, most)
     except SourceError as error:
@@ -144,10 +121,7 @@ def read_if_there(path: Path, most: int = MOST) -> bytes | None:
 
 
 def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
-    """Return the text of a UTF-8 file, which may begin with a byte order mark.
-
-    The function raises the same errors as `read_bytes`.
-    """
+    """Return the text of a UTF-8 file like `read_bytes`; the file may begin with a byte order mark."""
     try:
         return read_bytes(path, most, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -157,11 +131,7 @@ def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
 
 
 def read_standard_input(most: int = MOST) -> bytes:
-    """Return the content of standard input.
-
-    Raises:
-        SourceError: standard input is closed, cannot be read, or is larger than `most`.
-    """
+    """Return the content of standard input, at most `most` bytes, or raise SourceError."""
     data = read_start_of_standard_input(most + 1)
     if len(data) > most:
         raise _too_large("standard input", most)
@@ -169,11 +139,7 @@ def read_standard_input(most: int = MOST) -> bytes:
 
 
 def read_start_of_standard_input(count: int) -> bytes:
-    """Return the first `count` bytes of standard input, or all of it if it is shorter.
-
-    Raises:
-        SourceError: standard input is closed, or cannot be read.
-    """
+    """Return at most the first `count` bytes of standard input, or raise SourceError."""
     try:
         if sys.stdin is None:  # the parent process closed standard input
             raise OSError(errno.EBADF, os.strerror(errno.EBADF))
@@ -184,10 +150,7 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists.
-
-    If the name is too long, the result is True, and the error occurs when the file is read.
-    """
+    """Return whether a path exists, or is too long: then the error occurs when the file is read."""
     try:
         return path.exists()
     except OSError:
@@ -195,10 +158,7 @@ def exists(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder.
-
-    If the name is too long, the result is False, and the error occurs when the file is read.
-    """
+    """Return whether a path is a folder; a name that is too long is not a folder."""
     try:
         return path.is_dir()
     except OSError:
@@ -243,7 +203,7 @@ def _read_up_to(count: int, descriptor: int, first: bytes) -> bytes:
 def _first_of_pipe(descriptor: int, path: Path) -> bytes:
     """Return the first available bytes of a pipe, or b"" if a writer has connected but written nothing.
 
-    Raise a SourceError if no process opens the pipe for writing in time.
+    Raise SourceError if no process opens the pipe for writing in time.
     """
     events = select.poll()
     events.register(descriptor, select.POLLIN)
@@ -254,9 +214,8 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
                 return piece
         except BlockingIOError:  # a writer is connected but has written nothing yet
             return b""
-        if any(
-            event & select.POLLHUP for _, event in events.poll(0)
-        ):  # a writer connected and closed the pipe
+        # POLLHUP means that a writer connected and closed the pipe.
+        if any(event & select.POLLHUP for _, event in events.poll(0)):
             return b""
         time.sleep(0.01)
     raise SourceError(
@@ -270,11 +229,8 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
 def write_file(path: Path, data: bytes) -> None:
     """Write a file completely or not at all: write a temporary file in the same folder and rename it.
 
-    A link is followed. If the path is a device or a pipe, such as `/dev/null`, the data are written to it
-    directly, without a temporary file.
-
-    Raises:
-        SourceError: for example no permission, no such folder, or a full disk.
+    A link is followed. A device or a pipe, such as `/dev/null`, is written directly. Raise SourceError on a
+    failure, for example without permission or on a full disk.
     """
     name = ""
     try:
@@ -282,10 +238,10 @@ def write_file(path: Path, data: bytes) -> None:
             path.write_bytes(data)
             return
         path = path.resolve()
-        if path.exists() and not os.access(path, os.W_OK):  # renaming would ignore this permission
+        if path.exists() and not os.access(path, os.W_OK):  # a rename would ignore this permission
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
-        import tempfile  # noqa: PLC0415  reading a robot needs none
+        import tempfile  # noqa: PLC0415  loading a robot does not need this module
 
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
             name = stream.name

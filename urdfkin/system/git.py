@@ -22,8 +22,7 @@ class Version:
 
     Attributes:
         root: The repository's root folder; names are relative to it.
-        files: For each file name: git's digest of the file's content in this commit.
-        digests: The digests of all files of this commit, as a set.
+        files: Git's digest of the content of each file.
         gone: Base names of the files that no longer exist in the working tree.
     """
 
@@ -33,7 +32,6 @@ class Version:
     gone: frozenset[str]
 
     def name(self, path: Path) -> str:
-        """Return the name of a file relative to `root`."""
         return Path(os.path.relpath(path.resolve(), self.root)).as_posix()
 
     def holds(self, data: bytes) -> bool:
@@ -54,8 +52,7 @@ class Version:
     def read(self, path: Path) -> bytes | None:
         """Return the content of a file in this version; None if the file did not exist.
 
-        Raises:
-            SourceError: git failed, or the file was larger than `MOST` bytes.
+        Raise SourceError if git failed, or if the file was larger than `MOST` bytes.
         """
         if (digest := self.files.get(self.name(path))) is None:
             return None
@@ -70,14 +67,9 @@ class Version:
 
 
 def version_before(reference: str, folder: Path) -> Version:
-    """Return the merge base of the current commit and a reference.
+    """Return the merge base of the current commit and a reference (a branch, tag or commit).
 
-    Args:
-        reference: A branch, a tag or a commit.
-        folder: A folder of the repository.
-
-    Raises:
-        SourceError: git is not installed, the folder is in no repository, or there is no merge base.
+    Raise SourceError if git is not installed, the folder is in no repository, or there is no merge base.
     """
     root = Path(os.fsdecode(_git("rev-parse", "--show-toplevel", cwd=folder).rstrip(b"\n")))
     try:

@@ -1,7 +1,8 @@
 """Locks that are unlocked in a child process after a fork.
 
-`import urdfkin` imports this module first. This module imports nothing that an untrusted current folder could
-replace.
+A fork copies all locks, but only the thread that calls `fork`. Another thread's lock would stay locked in the
+child for ever. `import urdfkin` imports this module first. This module imports nothing that an untrusted
+current folder could replace.
 """
 
 from __future__ import annotations
@@ -10,16 +11,15 @@ import os
 import threading
 
 _locks: list[threading.RLock] = []
-#: For each thread that is forking, by thread identifier: the locks that the thread acquired before the fork.
+#: This dictionary maps the identifier of a forking thread to the locks that it acquired before the fork.
 _acquired: dict[int, list[threading.RLock]] = {}
 
 
 def lock_over_forks() -> threading.RLock:
-    """Return a lock that a child process never inherits in a locked state.
+    """Return a lock that is unlocked in a child process after a fork.
 
-    A fork waits until the lock is free. After the fork, the lock is unlocked in the parent and in the child.
-    A fork acquires the locks in reverse order of their creation. A thread that needs two of these locks must
-    also acquire the newer lock first.
+    A fork waits until the lock is free. It acquires the locks in reverse order of their creation, so a thread
+    that needs two of these locks must also acquire the newer lock first.
 
     Use this function only for locks that are module variables. This module never removes a lock from its
     list, so a lock of a deleted object would stay in the list until the process ends.
@@ -60,12 +60,11 @@ class _ImportLock:
         _locks.append(self._lock)
 
     def register(self) -> None:
-        """Let each later fork acquire the locks of this module."""
-        if self._registered:  # a module may call this during its import, while another thread holds the lock
+        if self._registered:  # a module may call `register` while another thread imports it
             return
         with self._lock:
             if not self._registered:
-                import logging  # noqa: F401, PLC0415  import late: a file in the current folder could replace `logging`
+                import logging  # noqa: F401, PLC0415  a file in the current folder could replace `logging`
 
                 os.register_at_fork(
                     before=_before_fork, after_in_parent=_after_fork, after_in_child=_after_fork

@@ -1,8 +1,7 @@
 """Parse XML like urdfdom: names as written, with undeclared namespace prefixes allowed.
 
 ElementTree's own parser refuses an undeclared prefix, which urdfdom accepts. The parser of this module is
-independent of `urdfkin.urdf.parser`, so it can check that parser's results. The module also compares the
-order of the moving joints in a URDF with their order in q.
+independent of `urdfkin.urdf.parser`, so it can check that parser's results.
 """
 
 from __future__ import annotations
@@ -15,16 +14,13 @@ from urdfkin.errors import Question
 
 
 def plain_xml(text: str) -> Element:
-    """Return the root element of a URDF that passed the checks.
-
-    Raises:
-        expat.ExpatError: the text is not well-formed.
+    """Return the root element of a URDF; raise expat.ExpatError if the text is not well-formed.
 
     >>> plain_xml("<robot><drake:x/></robot>")[0].tag
     'drake:x'
     """
     builder = TreeBuilder()
-    parser = expat.ParserCreate("utf-8")  # no separator: namespaces are not processed
+    parser = expat.ParserCreate("utf-8")  # expat ignores namespaces without a separator
     parser.buffer_text = True
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end
@@ -34,12 +30,7 @@ def plain_xml(text: str) -> Element:
 
 
 def order_words(urdf: str, joints: Sequence[str]) -> str:
-    """Return a sentence that compares the joint order of a file with the order of q.
-
-    Args:
-        urdf: The text of the URDF.
-        joints: Names of the moving joints, in the order of q.
-    """
+    """Return a sentence that compares the order of a URDF's joints with `joints`, in the order of q."""
     known = set(joints)
     written = [e.get("name", "") for e in plain_xml(urdf) if e.tag == "joint" and e.get("name") in known]
     ours = [name for name in joints if name in set(written)]

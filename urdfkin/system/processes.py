@@ -1,15 +1,8 @@
-"""Child processes, locks that survive a fork, and threads with a large stack.
+"""Child processes, and threads with a large stack.
 
 Child processes of urdfkin do not import from the current folder. urdfkin runs in folders with untrusted
 robots, and `python -c` and `python -m` search the current folder first: a file `json.py` beside a robot would
 be run. Libraries also search the current folder for settings files.
-
-A fork copies all locks, but only the thread that calls `fork`. If another thread holds a lock during the
-fork, this lock would stay locked in the child for ever. `urdfkin.system.locks.lock_over_forks` prevents this.
-
-`with_stack` runs a function on a thread with a large stack. Pinocchio and its parser traverse a robot
-recursively: a chain of about 3,000 links overflows a stack of 8 MiB, and a few hundred links overflow a
-smaller stack.
 """
 
 from __future__ import annotations
@@ -24,29 +17,23 @@ from typing import TypeVar
 
 from urdfkin.system.locks import lock_over_forks
 
-#: Environment variables that a Python interpreter may need to start.
+#: A Python interpreter may need these environment variables to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
-#: Settings that limit linear algebra to one thread. Each thread needs address space, which is limited in a
-#: confined process.
+#: Linear algebra uses one thread, because a confined process has little address space for threads.
 _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
     """Return a command that runs code in a new interpreter.
 
-    The new interpreter imports from the same folders, except the current folder.
-
-    Args:
-        code: Python code to run.
-        options: Options of the interpreter.
+    The new interpreter imports from the same folders, except the current folder. `options` are its options.
     """
     return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_path()!r}; {code}"]
 
 
 def _path() -> list[str]:
-    # Empty and relative entries refer to the current folder, so they are removed. If Python found urdfkin
-    # through a removed entry, the new interpreter would not find urdfkin. Therefore the folder of urdfkin is
-    # added.
+    # Empty and relative entries refer to the current folder.
+    # Without the folder of urdfkin, the new interpreter may not find urdfkin.
     home = str(Path(__file__).resolve().parents[2])
     return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_scratch(entry)), home]
 
@@ -59,17 +46,10 @@ def _is_scratch(entry: str) -> bool:
 def ask_python(command: list[str], request: bytes, patience: float, most: int) -> tuple[bytes, int | None]:
     """Run a process with a minimal environment, write a request to its standard input and read its output.
 
-    Args:
-        command: The command, for example of `own_python`.
-        request: Bytes for its standard input.
-        patience: Timeout in seconds. After this time the process is killed.
-        most: Largest output in bytes. If the process writes more, it is killed, and the function returns
-            `most` + 1 bytes.
-
-    Returns:
-        The output and the exit status. The status is None after a timeout.
+    The process is killed after `patience` seconds, and after more than `most` bytes of output. The result is
+    the output, with at most `most` + 1 bytes, and the exit status; the status is None after a timeout.
     """
-    import subprocess  # noqa: PLC0415  reading a robot needs none
+    import subprocess  # noqa: PLC0415  loading a robot does not need this module
 
     environ = _ENVIRONMENT | {name: os.environ[name] for name in _NEEDED if name in os.environ}
     pipe = subprocess.PIPE
@@ -104,9 +84,6 @@ def not_reading(settings: str) -> Iterator[None]:
     """Hide a settings file in the current folder from libraries.
 
     If the file exists, the current folder is `/` until the `with` block ends. Otherwise nothing changes.
-
-    Args:
-        settings: Name of the settings file.
     """
     if not os.path.lexists(settings):
         yield
@@ -129,10 +106,13 @@ _stack_size_lock = lock_over_forks()
 def with_stack(size: int, function: Callable[[], _T]) -> _T:
     """Call `function()` on a stack of at least `size` bytes; return its result or raise its exception.
 
+    Pinocchio and its parser traverse a robot recursively: a chain of about 3,000 links overflows a stack of
+    8 MiB, and a few hundred links overflow a smaller stack.
+
     >>> with_stack(64 * 2**20, lambda: 6 * 7)
     42
     """
-    from concurrent.futures import Future  # noqa: PLC0415
+    from concurrent.futures import Future  # noqa: PLC0415  most callers do not need this module
 
     future: Future[_T] = Future()
 

@@ -13,38 +13,26 @@ from urdfkin.errors import SourceError
 
 @cache
 def robots_dir() -> Path:
-    """Return the folder `robots`.
-
-    The folder is inside the installed package; in a checkout, the folder is beside the package.
-    """
-    here = Path(__file__).resolve().parents[1]
-    for folder in (here / "robots", here.parent / "robots"):
-        if (folder / "catalogue.toml").is_file():
-            return folder
-    raise SourceError("urdfkin's own robots are missing", where=str(here), remedy="install urdfkin again")
+    return _file("own robots are", "urdfkin/robots/catalogue.toml", "robots/catalogue.toml").parent
 
 
 def questions_page() -> Path:
-    """Return the path of questions.md.
+    return _file("page questions.md is", "urdfkin/questions.md", "docs/questions.md")
 
-    The file is inside the installed package; in a checkout, the file is in `docs`.
-    """
-    here = Path(__file__).resolve().parents[1]
-    for file in (here / "questions.md", here.parent / "docs" / "questions.md"):
-        if file.is_file():
-            return file
-    raise SourceError(
-        "urdfkin's page questions.md is missing", where=str(here), remedy="install urdfkin again"
-    )
+
+def _file(what: str, *paths: str) -> Path:
+    """Return a file in an installation or a checkout; paths begin in the folder above the package."""
+    here = Path(__file__).resolve().parents[2]
+    if (file := next((path for path in map(here.joinpath, paths) if path.is_file()), None)) is None:
+        raise SourceError(
+            f"urdfkin's {what} missing", where=str(here / "urdfkin"), remedy="install urdfkin again"
+        )
+    return file
 
 
 @cache
 def example_robots_dir() -> Path:
-    """Return the folder `share/example-robot-data/robots`, without importing that package.
-
-    Raises:
-        SourceError: example-robot-data is not installed.
-    """
+    """Return the folder `share/example-robot-data/robots` without importing that package."""
     candidates = list(_example_candidates())
     for folder in candidates:
         if folder.is_dir():
@@ -58,7 +46,7 @@ def example_robots_dir() -> Path:
 
 def _example_candidates() -> Iterator[Path]:
     below = Path("share", "example-robot-data", "robots")
-    from importlib import metadata  # noqa: PLC0415  this import is as slow as loading a robot
+    from importlib import metadata  # noqa: PLC0415  this import takes as long as loading a robot
 
     try:
         distribution = metadata.distribution("example-robot-data")

@@ -37,14 +37,13 @@ class Entry:
     """A robot of the catalogue.
 
     Attributes:
-        name: The short name.
         family: arm, hand, humanoid, quadruped, ...
         relative_path: The path of the URDF, relative to the robots folder of urdfkin or of
             example-robot-data.
         limbs: (base frame, tip frame) of each arm, leg or finger; the first pair is the default.
         mimic: Whether the mimic rules of the URDF are valid. If not, urdfkin ignores them by default.
-        reason: If `mimic` is False: the reason why the mimic rules are not valid.
-        poses: Named poses. Each pose maps joint names to joint values (rad or m). All other joints are at 0.
+        reason: The reason why the mimic rules are not valid, or None.
+        poses: Named poses: joint values (rad or m) by joint name. All other joints are at 0.
         own: True for a robot of urdfkin, False for a robot of example-robot-data.
     """
 
@@ -59,17 +58,14 @@ class Entry:
 
     @property
     def path(self) -> Path:
-        """The path of the URDF file."""
         return (robots_dir() if self.own else example_robots_dir()) / self.relative_path
 
     @property
     def base(self) -> str | None:
-        """The default base frame."""
         return next((base for base, _ in self.limbs.values()), None)
 
     @property
     def tip(self) -> str | None:
-        """The default tip frame."""
         return next((tip for _, tip in self.limbs.values()), None)
 
 
@@ -98,7 +94,6 @@ def robots(family: str | None = None) -> tuple[str, ...]:
 
 
 def examples() -> tuple[str, ...]:
-    """Return the names of the robots of example-robot-data."""
     return tuple(name for name, entry in catalogue().items() if not entry.own)
 
 
@@ -106,7 +101,7 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
     path = robots_dir() / file
     if not path.is_file():
         return {}
-    import tomllib  # noqa: PLC0415  a file needs no catalogue
+    import tomllib  # noqa: PLC0415  a robot from a file does not need this module
 
     with path.open("rb") as stream:
         table = tomllib.load(stream)
@@ -130,7 +125,7 @@ VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _NAME = re.compile(rb"<name>([^<]*)</name>")
 
-#: URI schemes that name a package and a path inside it.
+#: A URI with one of these schemes names a package and a path inside it.
 SCHEMES = ("package://", "model://")
 
 
@@ -153,13 +148,9 @@ def find_package(
     environ: Mapping[str, str] = os.environ,
     accepts: Callable[[Path], bool] = lambda folder: True,
 ) -> Path | None:
-    """Return the folder of a package, or None.
+    """Return the folder of a package, or None; the module docstring describes the search.
 
-    Args:
-        name: The package.
-        beside: The file that refers to the package. The search includes the folders above this file.
-        environ: The environment variables.
-        accepts: A filter: returns whether a candidate folder is acceptable.
+    The search includes the folders above the file `beside`. `accepts` filters the candidate folders.
     """
     if not name or name in (".", "..") or "\0" in name:
         return None
@@ -183,7 +174,6 @@ def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> I
 
 
 def _declares(manifest: Path, name: str) -> bool:
-    """Return whether a package.xml contains this name."""
     try:
         match = _NAME.search(read_start(manifest, 100_000))
     except OSError:
@@ -208,8 +198,6 @@ _DESCRIPTION_NAME = re.compile(r"\w+_description")
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """The file of a robot description, and the arguments for a .xacro file."""
-
     path: Path
     xacro_args: Mapping[str, object] = field(default_factory=dict)
 
@@ -234,13 +222,13 @@ def _module(name: str) -> ModuleType:
         raise InputError(
             f"{_PACKAGE} is not installed", where=name, remedy=f"pip install {_PACKAGE}, or name a file"
         )
-    from robot_descriptions import DESCRIPTIONS  # noqa: PLC0415  only for its descriptions
+    from robot_descriptions import DESCRIPTIONS  # noqa: PLC0415  most robots do not need this module
 
     if name not in DESCRIPTIONS:
         raise UnknownNameError("robot description", name, DESCRIPTIONS)
     try:
         return importlib.import_module(f"{_PACKAGE}.{name}")
-    except Exception as error:  # git has many exception classes
+    except Exception as error:  # git raises errors of many classes
         message = str(error).strip().splitlines() or [type(error).__name__]
         raise SourceError(
             "this robot description cannot be downloaded",

@@ -1,10 +1,9 @@
 """Confine the current process, so that it can only compute and read allowed files.
 
-The operating system limits the memory and time of the process. It also prevents the process from writing
-files and from starting other processes. Python raises an audit event for each opened file, new process,
-socket and import. An audit hook refuses every event that is not allowed. The process can remove neither the
-limits nor the hook. If a xacro file gained full control of the interpreter, it could circumvent the hook, but
-not the limits of the operating system.
+The operating system limits the memory and time of the process, and prevents it from writing files and from
+starting other processes. Python raises an audit event for each opened file, new process, socket and import,
+and an audit hook refuses every event that is not allowed. The process can remove neither the limits nor the
+hook. A xacro file with full control of the interpreter could circumvent the hook, but not the limits.
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
 expressions of a file without Python's `eval`.
@@ -24,9 +23,9 @@ from urdfkin.urdf.expressions import RefusedError
 #: Memory limit in bytes. The interpreter and its libraries need about a tenth of this memory.
 MEMORY = 2 * 1024**3
 
-#: Audit events that are allowed without a check.
+#: These audit events are allowed without a check.
 _HARMLESS = {"builtins.id", "compile", "glob.glob", "glob.glob/2", "object.__getattr__", "sys._getframe"}
-#: Audit events that are allowed only for files that the process may read.
+#: These audit events are allowed only for files that the process may read.
 _READING = {"open", "os.listdir", "os.scandir"}
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
@@ -47,18 +46,11 @@ class Ground:
 
     @classmethod
     def around(cls, path: Path, search: list[str], arguments: list[str]) -> Ground:
-        """Allow a file's folder, package and repository, and the paths in the xacro arguments.
-
-        Args:
-            path: The xacro file.
-            search: The folders on the user's search paths.
-            arguments: The values of the user's arguments. If a value is a path, the process may read the file
-                or folder at this path.
-        """
+        """Allow a file's folder, package and repository, the search paths, and paths in xacro arguments."""
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):
             wide += [folder for folder in path.resolve().parents if _exists(folder / mark)][:1]
-        home = os.path.expanduser("~")  # noqa: PTH111  Path.home() raises without a home
+        home = os.path.expanduser("~")  # noqa: PTH111  Path.home() raises an error without a home
         everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
         near = [path, path.parent, path.resolve().parent, *map(Path, search)]
@@ -66,21 +58,19 @@ class Ground:
         return cls([str(root) for root in roots], search)
 
     def holds(self, path: str) -> bool:
-        """Return whether a file or folder may be read."""
         real = os.path.realpath(path)
-        if os.path.basename(real) == "package.xml":  # noqa: PTH119  the package search reads it
+        # The search for a package reads every package.xml.
+        if os.path.basename(real) == "package.xml":  # noqa: PTH119  `real` is a string
             return True
         roots = self.roots
-        if any(_lies_in(root, os.path.abspath(path)) for root in self.installed):  # noqa: PTH100  no links
+        as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
+        if any(_lies_in(root, as_written) for root in self.installed):
             roots = [*roots, *_package_of(real)]
         return any(_lies_in(root, real) for root in roots)
 
 
 def _package_of(path: str) -> list[str]:
-    """Return the folder of a file's package, as a list with one entry.
-
-    The list is empty if the file belongs to no package.
-    """
+    """Return the folder of a file's package as a list of one entry, which is empty without a package."""
     return [str(folder) for folder in Path(path).parents if _exists(folder / "package.xml")][:1]
 
 
@@ -95,13 +85,13 @@ def _lies_in(root: str, path: str) -> bool:
 def _exists(path: Path) -> bool:
     try:
         return path.exists()
-    except OSError:  # the name is too long for a path
+    except OSError:  # the name is too long
         return False
 
 
 def limit(seconds: int) -> None:
     """Limit the memory and time of this process; forbid it to write files and start processes."""
-    import resource  # noqa: PLC0415  not on every system
+    import resource  # noqa: PLC0415  some systems do not have this module
 
     bounds = {
         resource.RLIMIT_AS: MEMORY,
@@ -120,13 +110,7 @@ def limit(seconds: int) -> None:
 
 
 def confine(holds: Callable[[str], bool]) -> None:
-    """From now on, allow this process to read certain files and nothing else.
-
-    Every other audit event is refused.
-
-    Args:
-        holds: A function that returns whether a file or folder may be read.
-    """
+    """From now on, allow this process to read the files that `holds` accepts, and nothing else."""
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
         if event in _HARMLESS:

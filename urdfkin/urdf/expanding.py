@@ -1,8 +1,7 @@
 """Expand a xacro file with xacrodoc, inside the confined process. No other module imports xacrodoc.
 
-Without this module, xacro lets a file run Python code and read environment variables. In the confined process
-the module `expressions` evaluates the expressions. The process has no environment variables, and the module
-`confinement` limits the files that it can read.
+xacro lets a file run Python code and read environment variables. Here, the module `expressions` evaluates the
+expressions, and `confinement` limits the files that the process can read.
 """
 
 from __future__ import annotations
@@ -20,11 +19,10 @@ from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import arguments_of
 
-#: Functions of xacro that are removed, because they give an expression access to types and attributes.
+#: These functions of xacro would give an expression access to types and attributes.
 _NEVER = ("type", "vars")
 
-#: xacro's own function evaluates this expression, but urdfkin's function refuses it. If the expression is
-#: refused, xacro calls urdfkin's function.
+#: xacro's own function evaluates this expression; urdfkin's function refuses it.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -35,7 +33,7 @@ def serve() -> None:
     request = json.load(sys.stdin)
     limit(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # an include without a package is relative to this folder
+    os.chdir(Path(request["path"]).parent)  # an include may be relative to this folder
     ground = Ground(**request["ground"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)
@@ -53,12 +51,12 @@ def _expand(
 ) -> dict[str, Any]:
     """Return the URDF, and the names of the arguments that the file declares.
 
-    Without arguments from the user, or if an include cannot be read, None is returned instead of the names.
+    The names are None without arguments from the user, or if an include cannot be read.
     """
-    import xacrodoc  # noqa: PLC0415  only here
+    import xacrodoc  # noqa: PLC0415  only the confined process needs this module
 
     _replace_evaluation(path, search, ground)
-    importlib.import_module("xml.dom.expatbuilder")  # imported now, because minidom would import it later
+    importlib.import_module("xml.dom.expatbuilder")  # minidom would import this module later
     confine(ground.holds)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf = document.to_urdf_string()
@@ -69,12 +67,11 @@ def _expand(
 def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -> None:
     """Make xacro and xacrodoc call urdfkin's functions to evaluate expressions and to find packages.
 
-    Raises:
-        RefusedError: the replacement has no effect.
+    Raise RefusedError if the replacement has no effect.
     """
-    import xacro  # noqa: PLC0415
-    import xacrodoc.packages  # noqa: PLC0415
-    from xacro import substitution_args  # noqa: PLC0415
+    import xacro  # noqa: PLC0415  only the confined process needs this module
+    import xacrodoc.packages  # noqa: PLC0415  only the confined process needs this module
+    from xacro import substitution_args  # noqa: PLC0415  only the confined process needs this module
 
     symbols = xacro._global_symbols
     for name in _NEVER:
@@ -107,7 +104,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
 
 
 def _tables(symbols: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the dicts of names for expressions: first the global names, then the names of each namespace."""
+    """Yield the global names for expressions, then the names of each namespace."""
     yield dict(symbols)
     yield from (value for value in symbols.values() if isinstance(value, dict))
 
@@ -116,10 +113,7 @@ def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[
     """Return the function that finds packages for xacro's $(find name)."""
 
     def is_package(folder: Path) -> bool:
-        """Return whether a folder is a package.
-
-        A folder that is outside the allowed folders needs a package.xml. So `$(find etc)` does not find /etc.
-        """
+        """Return whether a folder is allowed or has a package.xml. `$(find etc)` must not find /etc."""
         return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:

@@ -1,9 +1,8 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
-xacro itself passes expressions to `eval`. xacro searches for forbidden names only in the outermost code
-object. A lambda, a comprehension or a chain of attributes can therefore run any program. This module
-interprets the syntax tree and compiles nothing. It allows values, operators, the functions of xacro and the
-methods listed below, and refuses everything else.
+xacro itself passes expressions to `eval`. It searches for forbidden names only in the outermost code object,
+so a lambda, a comprehension or a chain of attributes can run any program. This module interprets the syntax
+tree. It allows values, operators, the functions of xacro and the methods listed below, and nothing else.
 """
 
 from __future__ import annotations
@@ -58,12 +57,7 @@ class RefusedError(Exception):
 
 
 def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[object]) -> Any:
-    """Return the value of an expression.
-
-    Args:
-        expression: The text of the expression.
-        names: The values of the names that occur in the expression.
-        functions: The functions that the expression may call. It may also call the allowed methods.
+    """Return the value of an expression, which may call `functions` and the methods of `_METHODS`.
 
     Raises:
         RefusedError: the expression contains something other than values, operators and allowed calls.
@@ -106,7 +100,7 @@ class _Evaluation:
                 return getattr(owner, name)
         if isinstance(owner, dict) and not name.startswith("_"):
             try:
-                return owner[name]  # `owner` is a xacro namespace, or the content of a YAML file
+                return owner[name]  # a xacro namespace, or a YAML file
             except (KeyError, AttributeError):
                 raise NameError(f"{name!r} is not defined in '{ast.unparse(node.value)[:80]}'") from None
         raise RefusedError(
@@ -189,10 +183,9 @@ class _Evaluation:
 
 
 class _Scope(Mapping[str, Any]):
-    """A lookup of names: first the names of a loop, then the names of the scope around the loop.
+    """The names of a loop, then the names of the scope around the loop.
 
-    xacro evaluates a name when it is read. A copy of the outer scope would read every name, so this class
-    makes no copy.
+    xacro evaluates a name when it is read. A copy of the outer scope would read every name.
     """
 
     def __init__(self, outer: Mapping[str, Any], own: Mapping[str, Any]) -> None:

@@ -1,9 +1,8 @@
-"""Define findings. A finding is a problem in a URDF, with a code, a position, the found text and a remedy.
+"""Define findings: problems in a URDF, each with a code, a position, the found text and a remedy.
 
-The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. The reporter
-computes the position of each finding in the bytes of the file, and applies the comments that silence
-findings. A finding is plain data: it can be printed, compared, converted to JSON or SARIF and sent to another
-process. A byte order mark has no effect on positions.
+The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. A finding is plain
+data: it can be printed, compared, converted to JSON or SARIF and sent to another process. A byte order mark
+has no effect on positions.
 
 A comment in a URDF names the codes that it silences, and gives a reason.
 
@@ -22,7 +21,7 @@ import codecs
 import re
 import unicodedata
 from array import array
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import Enum
 from itertools import islice
@@ -34,7 +33,7 @@ from urdfkin.errors.escape import log_line, printable
 from urdfkin.system.files import Edit, edited
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_LIMITS, START_TAG, Element, Limits
 
-#: Longest quotation from a file in a message, in characters.
+#: A message quotes at most this number of characters of a file.
 QUOTED = 60
 
 
@@ -48,28 +47,21 @@ def quoted(text: str, limit: int = QUOTED) -> str:
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: An excerpt of a long line has `SHOWN` characters. At most `BEFORE` of these characters precede the marked
-#: text.
+#: An excerpt of a long line has `SHOWN` characters; at most `BEFORE` of them precede the marked text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
 
 
 class Excerpts:
-    """Excerpts of one file: the line of a finding, with carets below the marked text.
-
-    Args:
-        data: The bytes of the file without a byte order mark.
-    """
+    """Excerpts of a file without a byte order mark: lines of findings, with carets below the marked text."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
         self.number, self.text = 0, ""
 
     def of(self, finding: Finding) -> str | None:
-        """Return two lines: the line of the file, and a line with carets below it.
-
-        Return None for a finding about the whole file.
+        """Return a line of the file and a line with carets; None for a finding about the whole file.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -79,34 +71,28 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # decode each line only once, because a line may be megabytes long
+        if self.number != finding.line:  # a line may be megabytes long, so it is decoded once
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
         first = max(start - BEFORE, 0) if len(self.text) > SHOWN else 0
         last = first + SHOWN
         end = min(start + finding.width, last)
-        before, marked, behind = map(
-            _printable, (self.text[first:start], self.text[start:end], self.text[end:last])
-        )
+        pieces = self.text[first:start], self.text[start:end], self.text[end:last]
+        before, marked, behind = (printable(piece.replace("\t", _TAB)) for piece in pieces)
         lead, tail = "..." if first else "", "..." if len(self.text) > last else ""
         number = f"{finding.line:>3}"
         caret = " " * (_cells(lead) + _cells(before)) + "^" * max(_cells(marked), 1)
         return f"{number} | {lead}{before}{marked}{behind}{tail}\n{' ' * len(number)} | {caret}"
 
 
-def _printable(text: str) -> str:
-    return printable(text.replace("\t", _TAB))
-
-
 def _cells(text: str) -> int:
-    """Return the number of terminal columns of a text."""
     return sum(
         0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
     )
 
 
-#: Bound (rad) on the error when an angle of at most one revolution is rounded to a double.
+#: Rounding an angle of at most one revolution to a double has at most this error (rad).
 ROUNDING = 2.0**-50
 
 
@@ -125,7 +111,6 @@ class Fix:
 
     @property
     def is_safe(self) -> bool:
-        """Whether the fix rotates the joint frame by at most `ROUNDING`."""
         return self.turns <= ROUNDING
 
 
@@ -225,7 +210,7 @@ class Finding:
             return ""
         tag = shortened(self.element)
         if self.element == "prim" and self.name is not None and len(self.name) > QUOTED:
-            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"  # the end of a path names the prim
+            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"  # a path ends with the prim's name
         return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
 
     @property
@@ -285,14 +270,19 @@ class Finding:
 
 
 class Findings(list[Finding], Displayable):
-    """The findings of one file, sorted by line. The list is displayed as a table."""
-
     def _sheet(self) -> TextDocument:
         rows = [(f"{f.file}:{f.line}:{f.column}", f.code, f.severity.value, f.sentence) for f in self]
-        counts = {s: sum(f.count for f in self if f.severity is s) for s in Severity}
-        totals = [f"{n} {s.value}{'s' if n > 1 else ''}" for s, n in counts.items() if n]
         table = [Table(("place", "code", "severity", "what"), rows, left=4)] if rows else []
-        return TextDocument(", ".join(totals) or "no findings", table)
+        return TextDocument(totals(self), table)
+
+
+def severity_counts(findings: Sequence[Finding]) -> dict[str, int]:
+    return {s.value: sum(f.count for f in findings if f.severity is s) for s in Severity}
+
+
+def totals(findings: Sequence[Finding]) -> str:
+    words = [f"{n} {word}{'s' if n > 1 else ''}" for word, n in severity_counts(findings).items() if n]
+    return ", ".join(words) or "no findings"
 
 
 def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
@@ -315,7 +305,7 @@ class UrdfError(UrdfkinError, ValueError):
     URDF402
     """
 
-    #: Number of errors that the message lists. The message only counts further errors.
+    #: The message lists at most this number of errors, and counts the others.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -359,8 +349,6 @@ class Rule:
         id: The code: `URDF` and three digits. A code is never reused. The first digit shows the topic of the
             rule. 1: text and XML. 2: elements and attributes. 3: numbers. 4: names and structure. 5: joints.
             6: probable mistakes. 7: inertials, geometry and materials.
-        slug: The short name.
-        severity: The default severity of its findings.
         oracle: Pinocchio's behaviour, if it differs from the specification.
     """
 
@@ -370,7 +358,7 @@ class Rule:
     oracle: PinocchioReading | None = None
 
 
-#: A comment that begins with this word contains an instruction for urdfkin. Spaces may precede the word.
+#: A comment with an instruction for urdfkin begins with this word, after any spaces.
 MARK = "urdfkin:"
 
 
@@ -380,8 +368,6 @@ class Comment:
 
     Attributes:
         text: The text between `<!--` and `-->`.
-        line: The line, from 1.
-        column: The column, from 1.
         behind: Whether the line has other text before the comment.
         element: The next element, or None.
     """
@@ -395,14 +381,7 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """The codes that a comment silences.
-
-    Attributes:
-        comment: The comment.
-        codes: The codes.
-        reason: The reason.
-        used: The codes in this comment that have silenced at least one finding.
-    """
+    """The codes that a comment silences; `used` are the codes that have silenced at least one finding."""
 
     comment: Comment
     codes: tuple[str, ...]
@@ -410,7 +389,7 @@ class Silence:
     used: set[str] = field(default_factory=set)
 
 
-#: For each code: the first comment that silences it.
+#: Each code has the first comment that silences it.
 Codes = dict[str, Silence]
 
 
@@ -422,7 +401,6 @@ class Silences:
         everywhere: Comments for the whole file.
         lines: Comments for a line, by line number.
         elements: Comments for an element, by the element's `id()`.
-        all: All comments.
     """
 
     everywhere: Codes = field(default_factory=dict)
@@ -434,7 +412,6 @@ class Silences:
         return bool(self.all)
 
     def add(self, silence: Silence) -> None:
-        """Add a comment."""
         self.all.append(silence)
         place = self._place(silence.comment)
         for code in silence.codes:
@@ -450,13 +427,7 @@ class Silences:
         return self.elements.setdefault(id(comment.element), {})
 
     def reason(self, code: str, line: int, at: Element | None) -> str | None:
-        """Return the reason of the nearest comment that silences a finding; None if there is none.
-
-        Args:
-            code: The code of the finding.
-            line: The line of the finding.
-            at: The element of the finding.
-        """
+        """Return the reason of the nearest comment that silences a finding; None if there is none."""
         silence = self.lines.get(line, {}).get(code)
         while silence is None and at is not None:
             silence = self.elements.get(id(at), {}).get(code)
@@ -468,22 +439,18 @@ class Silences:
         return silence.reason
 
 
-#: The search for the correct spelling of a misspelt name is slow. In one file, urdfkin searches for at most
-#: `SEARCHES` names, and compares each with at most `CANDIDATES` known names. `WORK` is the argument `work` of
-#: `nearest`.
+#: urdfkin searches the correct spelling of at most `SEARCHES` misspelt names in a file.
+#: Each search compares at most `CANDIDATES` known names; `WORK` is the argument `work` of `nearest`.
 SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
 
-#: If a file has at least `FOLDED` warnings with one code, urdfkin combines them into one finding. The same
-#: applies to notes. For the codes URDF7xx (content that kinematics does not use), `FOLDED_EXTRAS` findings
-#: are enough.
+#: `FOLDED` or more warnings (or notes) with one code become one finding.
+#: For the codes URDF7xx (content that kinematics does not use), `FOLDED_EXTRAS` findings are enough.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: urdfkin reports at most this number of errors with one code separately. For further errors it only lists
-#: the line numbers.
+#: At most this number of errors with one code is reported separately; the last lists the other lines.
 ERRORS_SHOWN = 100
 
-#: urdfkin stores at most this number of findings with one code completely. For further findings it only
-#: stores the line number.
+#: At most this number of findings with one code is stored; of further ones, only the line numbers.
 WRITTEN_OUT = 10_000
 
 
@@ -491,11 +458,8 @@ WRITTEN_OUT = 10_000
 class _Kind:
     """The findings of one code and severity.
 
-    Attributes:
-        severity: The severity.
-        found: Pairs of a finding and its weight (see the argument `weight` of `Reporter.add`). There are at
-            most `WRITTEN_OUT` pairs.
-        lines: The line numbers of all findings that are not in `found`.
+    `found` has at most `WRITTEN_OUT` findings, each with its weight (see `Reporter.add`). `lines` are the
+    line numbers of the others.
     """
 
     severity: Severity
@@ -510,9 +474,8 @@ class Reporter:
     Attributes:
         file: The name of the file, for the findings.
         data: The bytes of the file, for the positions of attributes.
-        limits: Limits on the size of the file and its parts.
         comments: The comments for urdfkin.
-        silenced: Pairs of a finding that a comment silences, and the reason in this comment.
+        silenced: The findings that a comment silences, each with the reason in this comment.
         silences: The parsed comments.
     """
 
@@ -543,22 +506,15 @@ class Reporter:
         weight: float = 0.0,
         fix: Callable[[], Fix | None] | None = None,
     ) -> None:
-        """Add a finding.
+        """Add a finding with a message, the wrong text `found` (in quotes) and a remedy.
 
-        Args:
-            rule: The rule.
-            message: The problem in one clause.
-            at: The element with the problem. If it is None, the finding is at `position`.
-            attribute: Name of an attribute of the element `at`. The printed excerpt of the file underlines
-                this attribute.
-            found: The wrong text in the file, in quotes.
-            remedy: The remedy.
-            owner: The tag that the finding names. None: the tag of the link or joint that contains `at`. Set
-                `owner` if `at` is a link or joint in the wrong place.
-            severity: Severity of the finding; None: the severity of the rule.
-            position: Line and column of the finding, if `at` is None.
-            weight: If findings of one kind are combined, the finding with the greatest weight is reported.
-            fix: A function that returns the automatic fix; None if there is no automatic fix.
+        - `at` is the element with the problem. Without `at`, the finding is at `position` (line and column).
+        - `attribute` is the attribute of `at` that the printed excerpt of the file underlines.
+        - `owner` is the tag that the finding names, if `at` is a link or joint in the wrong place.
+          By default, the finding names the link or joint that contains `at`.
+        - `severity` replaces the severity of the rule.
+        - `weight`: if findings of one kind are combined, the finding with the greatest weight is reported.
+        - `fix` returns the automatic fix, or None.
         """
         severity = rule.severity if severity is None else severity
         # A comment cannot silence an error.
@@ -610,11 +566,7 @@ class Reporter:
                 kind.found = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three known names similar to `word`.
-
-        This search is slow. Therefore, only the first `SEARCHES` calls search. Later calls return an empty
-        list.
-        """
+        """Return up to three similar names; [] after `SEARCHES` calls, because the search is slow."""
         self._searches += 1
         if self._searches > SEARCHES:
             return []
@@ -627,7 +579,6 @@ class Reporter:
 
     @property
     def failed(self) -> bool:
-        """Whether there is an error."""
         return any(severity is Severity.ERROR for _, severity in self._kinds)
 
     def findings(
@@ -635,12 +586,9 @@ class Reporter:
     ) -> tuple[Finding, ...]:
         """Return the findings by line.
 
-        Args:
-            fold: Whether to combine many warnings with one code into one finding. If `fold` is True and there
-                are more than a hundred errors with one code, the hundredth error lists the lines of the
-                others.
-            wanted: A function that returns whether to report a finding. It is called once for each finding,
-                in file order. None: all findings are reported.
+        `fold` combines many warnings with one code into one finding; of more than a hundred errors with one
+        code, the hundredth lists the lines of the others. `wanted` is called once for each finding, in file
+        order, and returns whether to report it.
         """
         kinds = [kind for kind in self._kinds.values() if kind.found]
         if wanted is not None:
@@ -658,19 +606,13 @@ class Reporter:
 
     @property
     def has_raw_blanks(self) -> bool:
-        """Whether an attribute value contains a tab, a line end, or a reference such as `&amp;`.
-
-        An XML parser replaces these characters.
-        """
+        """Whether an attribute value contains characters that an XML parser replaces (see `_RAW_BLANK`)."""
         if self._raw_blanks is None:
             self._raw_blanks = _RAW_BLANK.search(self.data) is not None
         return self._raw_blanks
 
     def raw(self, at: Element, attribute: str) -> str | None:
-        """Return the value of an attribute as written in the file.
-
-        An XML parser replaces tabs, line ends and references such as `&amp;`; here they are unchanged.
-        """
+        """Return the value of an attribute as written, before an XML parser replaces its characters."""
         span = self._spans(at).get(attribute)
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
@@ -689,7 +631,6 @@ class Reporter:
         return span.line, span.column, len(first.decode("utf-8", "replace"))
 
     def rewritten(self, at: Element, attribute: str, value: str, turns: float = 0.0) -> Fix | None:
-        """Return the fix that changes the value of an attribute."""
         span = self._spans(at).get(attribute)
         return None if span is None else Fix((Edit(*span.value, value),), turns)
 
@@ -702,10 +643,7 @@ class Reporter:
         )
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element.
-
-        If the line contains only this element, the whole line is removed.
-        """
+        """Return the fix that removes an empty element, or the whole line if it has nothing else."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
@@ -738,8 +676,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Pattern of an attribute value with a tab, a line end or a reference such as `&amp;`.
-#: An XML parser replaces these characters. Possessive quantifiers keep the matching time linear.
+#: An XML parser replaces tabs, line ends and references such as `&amp;` in a value.
+#: Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 NEWLINE = re.compile(rb"\r\n|\r|\n")
@@ -771,10 +709,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings with one code and severity.
-
-    If there are many, combine them into one finding that lists all lines.
-    """
+    """Return the findings with one code and severity; many become one finding that lists all lines."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

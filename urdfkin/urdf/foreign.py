@@ -19,7 +19,7 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
-from urdfkin.urdf.mjcf import UNBOUNDED
+from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, unique
 from urdfkin.urdf.parser import QUATERNION
 from urdfkin.urdf.reader import joint_rows, root_link
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
@@ -35,29 +35,21 @@ _NOWHERE = Element("", {}, None, 0, 0, 0)
 
 
 class XmlElement(Protocol):
-    """An element of Python's ElementTree or of lxml's."""
+    @property
+    def tag(self) -> Any: ...
 
     @property
-    def tag(self) -> Any:
-        """The name of the element."""
-
-    @property
-    def attrib(self) -> Any:
-        """The names and values of the attributes."""
+    def attrib(self) -> Any: ...
 
 
 class XmlTree(Protocol):
-    """A tree of `XmlElement`."""
-
-    def getroot(self) -> Any:
-        """Return the root element."""
+    def getroot(self) -> Any: ...
 
 
 def text_of(source: Any) -> tuple[str, str] | None:
     """Return the URDF text of an object and its name in messages; None for any other source.
 
-    Raises:
-        InputError: an element cannot be written as XML, or a yourdfpy robot is not a tree.
+    Raise InputError if an element cannot be written as XML, or a yourdfpy robot is not a tree.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return urdf_of(getattr(source, "robot", source)), "<yourdfpy>"
@@ -71,11 +63,7 @@ def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
     """Return a finding for a yourdfpy robot whose rotations may be lost; none for any other source.
 
     yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text of the file. If a joint in
-    the file has quat_xyzw, yourdfpy loses the rotation of this joint.
-
-    Args:
-        source: The object.
-        file: The name of the robot in messages.
+    the file has quat_xyzw, yourdfpy loses the rotation of this joint. `file` is the robot's name in messages.
     """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -120,7 +108,6 @@ def urdf_of(robot: yourdf.Robot) -> str:
 
 
 def _record(joint: yourdf.Joint) -> JointRecord:
-    """Convert a joint of yourdfpy to a record."""
     T = np.eye(4) if joint.origin is None else np.asarray(joint.origin, dtype=np.float64)
     axis = (1.0, 0.0, 0.0) if joint.axis is None else tuple(map(float, joint.axis))
     limit, rule = joint.limit, joint.mimic
@@ -134,7 +121,7 @@ def _record(joint: yourdf.Joint) -> JointRecord:
 
 
 def _text(root: Any) -> str:
-    """Write elements, attributes and text. Comments are skipped; their tag is not a string."""
+    """Write elements, attributes and text without comments, whose tag is not a string."""
     if not isinstance(root.tag, str):
         raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
     try:
@@ -152,9 +139,8 @@ def _text(root: Any) -> str:
 
 
 _ROOT = "universe"
-#: Pattern for the class names of joints whose axis is the x, y or z axis of the joint frame.
+#: The axis of a joint of these classes is the x, y or z axis of the joint frame.
 #: R is a revolute joint, RUB a revolute joint without limits, and P a prismatic joint.
-#: `_KINDS` contains the class names of all other joints.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
     "R": JointKind.REVOLUTE,
@@ -166,8 +152,7 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: If a joint has no limit, Pinocchio stores the largest double. urdfkin therefore treats each limit above
-#: this number as missing.
+#: A limit above this number counts as missing: Pinocchio stores the largest double for no limit.
 _ENDLESS = 1e300
 
 
@@ -176,10 +161,8 @@ class Modelled:
     """The tree of a model.
 
     Attributes:
-        tree: The kinematic tree.
-        joints: For each link whose frame is the frame of a Pinocchio joint: the index of this joint in the
-            model.
-        frames: For each other link: the index of its frame in the model.
+        joints: The index of a Pinocchio joint, by each link whose frame is the frame of this joint.
+        frames: The index of a Pinocchio frame, by each other link.
     """
 
     tree: KinematicTree
@@ -188,38 +171,29 @@ class Modelled:
 
 
 def is_model(source: object) -> TypeGuard[Any]:
-    """Return whether an object is Pinocchio's `Model` or `RobotWrapper`.
-
-    The function compares class names, so that it does not import Pinocchio.
-    """
+    """Return whether an object is Pinocchio's `Model` or `RobotWrapper`, without importing Pinocchio."""
     kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(source).__mro__]
     return ("pinocchio", "Model") in kinds or ("pinocchio", "RobotWrapper") in kinds
 
 
 def tree_of_model(source: Any) -> Modelled:
-    """Convert Pinocchio's `Model` or `RobotWrapper` to a kinematic tree.
-
-    Raises:
-        InputError: the model has a joint of a type that URDF does not have.
-    """
+    """Convert Pinocchio's `Model` or `RobotWrapper`; raise InputError for a joint that URDF does not have."""
     model = getattr(source, "model", source)
     return _ModelReader(model).read()
 
 
 class _ModelReader:
-    """Convert one model to a kinematic tree. The attributes store intermediate results."""
-
     def __init__(self, model: Any) -> None:
         self.model = model
         self.frames = list(model.frames)
         self.kinds = [str(frame.type) for frame in self.frames]
-        self.names: dict[str, set[str]] = {"link": set(), "joint": set(map(str, model.names))}
+        self.link_names, self.joint_names = set[str](), set(map(str, model.names))
         self.places = [np.array(frame.placement.homogeneous) for frame in self.frames]
         self.bodies = dict(self._bodies_on_joints())
         joints = range(int(model.njoints))
         bodies = self.bodies
         names = {j: self.frames[bodies[j]].name if j in bodies else self._default_name(j) for j in joints}
-        self.carriers = {j: self._new("link", name) for j, name in names.items()}
+        self.carriers = {j: unique(name, self.link_names) for j, name in names.items()}
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
@@ -232,18 +206,8 @@ class _ModelReader:
     def _default_name(self, joint: int) -> str:
         return f"{self.model.names[joint]}_link" if joint else _ROOT
 
-    def _new(self, kind: str, name: str) -> str:
-        """Return the name, with underscores appended until it is unique."""
-        while name in self.names[kind]:
-            name += "_"
-        self.names[kind].add(name)
-        return name
-
     def read(self) -> Modelled:
-        """Convert all frames, then all moving joints.
-
-        In a Pinocchio model, parent frames precede child frames.
-        """
+        """Convert all frames, then all moving joints. In a model, parent frames precede child frames."""
         for i in range(len(self.frames)):
             self._frame(i)
         own = {
@@ -260,10 +224,7 @@ class _ModelReader:
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return the parent link of a frame, and the frame's pose in this link.
-
-        T is the frame's pose in the frame of its parent joint.
-        """
+        """Return a frame's parent link and its pose in this link. T is its pose in its parent joint."""
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T
@@ -282,11 +243,11 @@ class _ModelReader:
         link, T = self._attachment(frame, joint, self.places[i])
         if kind == "FIXED_JOINT":
             body = next((f for f in self.frames[i + 1 :] if int(f.parentFrame) == i), None)
-            child, name = self._new("link", body.name if body is not None else frame.name), frame.name
+            child = unique(frame.name if body is None else body.name, self.link_names)
+            name = frame.name
         else:
-            child, name = self._new("link", frame.name), f"{frame.name}_fixed"
-        fixed_joint = Joint(self._new("joint", name), JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
-        self.rows.append((fixed_joint, link, child))
+            child, name = unique(frame.name, self.link_names), f"{frame.name}_fixed"
+        self.rows.append((fixed_joint(unique(name, self.joint_names), T), link, child))
         self.links[i] = child
 
     def _joint(self, j: int, T: FloatArray) -> Joint:

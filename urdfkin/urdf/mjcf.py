@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -44,13 +44,12 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
-#: Position limit, +- m, that the URDF gets for a slide joint without limits.
-#: URDF requires limits for a prismatic joint.
+#: A slide joint without limits gets these limits (+- m), because a prismatic joint of a URDF needs limits.
 UNBOUNDED = 1000.0
-#: Pattern of the beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
+#: An MJCF text begins with this pattern. Possessive quantifiers keep the matching time linear.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _ENDINGS = (".xml", ".mjcf")
-#: Bytes of a file that are read to recognize MJCF.
+#: This number of bytes of a file is read to recognize MJCF.
 _HEAD = 65_536
 
 
@@ -76,16 +75,12 @@ class Mjcf:
     """A robot from an MJCF file.
 
     Attributes:
-        tree: The links and joints.
         model: MuJoCo's compiled model with all bodies.
         fused: The compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
-        frames: For each link: "body" or "site", and the index of this body or site in MuJoCo's model.
-        coordinates: For each moving joint, including mimic joints: its index in MuJoCo's qpos.
-        rules: The equalities that the tree represents as mimic rules. The key is the index of the equality in
-            MuJoCo's model. The value is the name of the mimic joint.
-        apart: The active equalities between joints that the tree cannot represent as mimic rules, as indices
-            in MuJoCo's model.
-        listed: The parts of the file that the kinematic tree does not represent, and probable mistakes.
+        frames: "body" or "site" of each link, and the index of this body or site in MuJoCo's model.
+        coordinates: The index of each moving joint, including mimic joints, in MuJoCo's qpos.
+        rules: The mimic joint of each equality that is a mimic rule, by index in MuJoCo's model.
+        apart: Indices of the active equalities between joints that the tree cannot represent.
         whole: Whether `model` contains the shapes and inertias of the file.
         aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.
     """
@@ -121,8 +116,7 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), by `mj_kinematics`.
 
-        If `fused` is not None, this method uses the fused model for all frames in it. For the other frames it
-        uses `model`.
+        The fused model, if there is one, computes the frames that it contains.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -142,8 +136,8 @@ class Mjcf:
     def lengths(self, q: FloatArray) -> FloatArray:
         """Return an upper bound (n, frames), in m, of each frame's distance from the world's origin.
 
-        The upper bound is the sum of the lengths of all translations from the world to the frame. It is used
-        in bounds on rounding errors.
+        The bound is the sum of the lengths of all translations from the world to the frame. Bounds on
+        rounding errors use it.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -159,10 +153,10 @@ class Mjcf:
         return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
-        """For each frame, return a sum of joint angles (n, frames), in rad, for bounds on rounding errors.
+        """Return a sum of joint angles (n, frames), in rad, for bounds on rounding errors.
 
-        The sum contains |q| + |ref| for each hinge between the world and the frame that has a reference value
-        `ref`.
+        The sum of a frame contains |q| + |ref| for each hinge between the world and the frame that has a
+        reference value `ref`.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -182,7 +176,7 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Convert a quantity per body, `at_body` (n, bodies), to a quantity per frame (n, frames).
+        """Convert `at_body` (n, bodies) to a quantity per frame (n, frames).
 
         The frame of a body has the quantity of this body. The frame of a site has the quantity of its body,
         plus the quantity of the site in `own`.
@@ -276,14 +270,9 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
 def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
-    Args:
-        source: A path or text; included files are read, too.
-        name: The name of the source in messages.
-        whole: True: MuJoCo compiles the unchanged file, with its meshes. False: urdfkin first removes the
-            shapes and the inertias, so that MuJoCo can compile the file without its mesh files.
-
-    Raises:
-        InputError: MuJoCo is not installed or does not accept the file, or the robot has a ball joint.
+    With `whole`, MuJoCo compiles the unchanged file with its meshes. Otherwise urdfkin first removes the
+    shapes and the inertias, so that MuJoCo needs no mesh files. `name` is the name of the source in messages.
+    Raise InputError if MuJoCo is not installed or does not accept the file, or if the robot has a ball joint.
     """
     mujoco = library()
     fused = None
@@ -333,9 +322,8 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
 def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # a confined process cannot start threads
-    spec.memory = spec.njmax = spec.nconmax = (
-        spec.nstack
-    ) = -1  # ignore large memory sizes in the file, which only dynamics needs
+    # -1 ignores large memory sizes in the file, which only dynamics needs.
+    spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
     return spec
 
 
@@ -377,23 +365,20 @@ def _align_note(body: str, *, whole: bool) -> Listed:
         return Listed("MuJoCo aligns this free body: its frame is its inertial frame", where)
     what = (
         "MuJoCo aligns the frame of this free body with its inertial frame, which depends on its shapes;"
-        " here the frame is the one in the file"
+        " urdfkin uses the frame in the file"
     )
     return Listed(what, where, moves=True)
 
 
 def name_of(source: str | bytes | os.PathLike[str]) -> str:
-    """Return the name that messages use for a source."""
     return "<bytes>" if isinstance(source, bytes) else "<text>" if is_text(source) else str(source)
 
 
 def is_text(source: object) -> bool:
-    """Return whether a source is the text of an MJCF, not the path of a file."""
     return isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
 
 
 def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
-    """Yield the elements that kinematics does not need, by kind."""
     for words in (
         "keys", "sensors", "actuators", "tendons", "excludes", "pairs", "skins", "flexes", "geoms", "cameras",
         "lights", "meshes", "hfields", "materials", "textures",
@@ -421,9 +406,8 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
     """Yield a finding if a file is in degrees, but the limits of its hinges are probably in radians.
 
-    The angle unit applies to the whole file. Therefore, there is a finding only if the limits of all hinges
-    are implausibly small in degrees. The opposite
-    mistake, degrees in a file in radians, is not reported: all hinges of some robots turn several times.
+    The angle unit applies to the whole file, so the limits of all hinges must be implausibly small in
+    degrees. The opposite mistake is not reported: all hinges of some robots turn several times.
     """
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
@@ -444,7 +428,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # otherwise MuJoCo aligns the body frame with the placeholder inertia from the next loop
+        # MuJoCo must not align the frame with the placeholder inertia from the next loop.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -469,22 +453,22 @@ class _Reader:
     mimic_equalities: dict[int, str] = field(default_factory=dict)
     apart: set[int] = field(default_factory=set)
     _joints: list[tuple[Joint, str, str]] = field(default_factory=list)
-    _names: dict[str, set[str]] = field(default_factory=lambda: {"link": set(), "joint": set()})
+    _link_names: set[str] = field(default_factory=set)
+    _joint_names: set[str] = field(default_factory=set)
     _links: list[str] = field(default_factory=list)
     _hinges: dict[int, str] = field(default_factory=dict)
 
     def tree(self) -> KinematicTree:
-        """Return the tree of links and joints."""
         m = self.model
-        self._links = [self._new("link", m.body(i).name or f"body{i}") for i in range(m.nbody)]
-        self._hinges = {i: self._new("joint", m.joint(i).name or f"joint{i}") for i in range(m.njnt)}
+        self._links = [unique(m.body(i).name or f"body{i}", self._link_names) for i in range(m.nbody)]
+        self._hinges = {i: unique(m.joint(i).name or f"joint{i}", self._joint_names) for i in range(m.njnt)}
         for i in range(m.nbody):
             self.frames[self._links[i]] = "body", i
             if i:
                 self._body(i)
         for i in range(m.nsite):
             if name := m.site(i).name:
-                link = self._new("link", name)
+                link = unique(name, self._link_names)
                 self.frames[link] = "site", i
                 T = _pose(m.site_pos[i], m.site_quat[i])
                 self._fix(T, self._links[m.site_bodyid[i]], link)
@@ -492,16 +476,9 @@ class _Reader:
         joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in self._joints]
         return build_tree(self.name, self._links[0], joints)
 
-    def _new(self, kind: str, name: str) -> str:
-        """Return the name, with underscores appended until it is unique."""
-        while name in self._names[kind]:
-            name += "_"
-        self._names[kind].add(name)
-        return name
-
     def _fix(self, T: FloatArray, parent: str, child: str) -> None:
-        name = self._new("joint", f"{child}_fixed")
-        self._joints.append((Joint(name, JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0])), parent, child))
+        name = unique(f"{child}_fixed", self._joint_names)
+        self._joints.append((fixed_joint(name, T), parent, child))
 
     def _body(self, i: int) -> None:
         """Add the joints of a body one after the other, then its own link."""
@@ -515,7 +492,7 @@ class _Reader:
         for j in range(first, first + count):
             anchor, name = pose(p=m.jnt_pos[j]), self._hinges[j]
             ends_here = j == first + count - 1 and not m.jnt_pos[j].any()
-            child = link if ends_here else self._new("link", f"{name}_link")
+            child = link if ends_here else unique(f"{name}_link", self._link_names)
             joint, back = self._joint(j, name, T @ anchor)
             self._joints.append((joint, here, child))
             self.coordinates[name] = int(m.jnt_qposadr[j])
@@ -550,7 +527,6 @@ class _Reader:
         return Joint(name, urdf_kind, 0, T, axis, limit), back
 
     def _range(self, j: int, name: str, *, turns: bool) -> tuple[JointKind, Limit | None]:
-        """Return the kind of the joint in a URDF, and its limits."""
         m = self.model
         effort = float(m.jnt_actfrcrange[j].max()) if m.jnt_actfrclimited[j] else np.inf
         if m.jnt_limited[j]:
@@ -581,7 +557,7 @@ class _Reader:
             if rule is None:
                 names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
                 what = f"a constraint ({names}) that is no linear relation of two joints"
-            elif rule[0] in rules or _leads(rules, rule[1].leader, rule[0]):
+            elif rule[0] in rules or leads(rules, rule[1].leader, rule[0]):
                 what = f"joint {rule[0]} has two rules, or its rules form a circle"
             else:
                 rules[rule[0]] = rule[1]
@@ -590,12 +566,12 @@ class _Reader:
             self.apart.add(i)
             self.listed.append(Listed(what, where, moves=True))
         for name in rules:
-            yield name, _resolve(rules, name)
+            yield name, resolve(rules, name)
 
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
         """Return the name of the mimic joint y and its rule from an equality y - y0 = c0 + c1 (x - x0).
 
-        x0 and y0 are the reference values of the joints. Return None if the equality is not linear, or
+        x0 and y0 are the reference values of the joints. The result is None if the equality is not linear, or
         concerns only one joint.
         """
         m = self.model
@@ -607,14 +583,26 @@ class _Reader:
         return self._hinges[y], Mimic(self._hinges[x], float(c[1]), float(y0 + c[0] - c[1] * x0))
 
 
-def _leads(rules: dict[str, Mimic], joint: str, to: str) -> bool:
+def unique(name: str, taken: set[str]) -> str:
+    """Append underscores to a name until it is unique, and add it to the taken names."""
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
+
+
+def fixed_joint(name: str, T: FloatArray) -> Joint:
+    return Joint(name, JointKind.FIXED, 0, T, np.array([1.0, 0.0, 0.0]))
+
+
+def leads(rules: Mapping[str, Mimic], joint: str, to: str) -> bool:
     """Return whether `joint` mimics `to`, directly or through other mimic joints."""
     while joint in rules and joint != to:
         joint = rules[joint].leader
     return joint == to
 
 
-def _resolve(rules: dict[str, Mimic], joint: str) -> Mimic:
+def resolve(rules: Mapping[str, Mimic], joint: str) -> Mimic:
     """Combine a chain of mimic rules into one rule, whose mimicked joint moves independently."""
     rule = rules[joint]
     while rule.leader in rules:

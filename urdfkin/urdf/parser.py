@@ -1,13 +1,12 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
-`read_document` checks that the bytes are UTF-8 and parses the XML to elements with positions. The XML parser
-is expat. It does not change names (`xacro:macro`), reports the position of every start tag, needs no stack
-for deep nesting, and opens no file. If a document type declaration defines entities or refers to an external
-file, parsing stops with an error. No entity is expanded.
+The XML parser is expat. It does not change names (`xacro:macro`), reports the position of every start tag,
+needs no stack for deep nesting, and opens no file. If a document type declaration defines entities or refers
+to an external file, parsing stops with an error. No entity is expanded.
 
-`read_robot` reads links and joints into records. Each attribute must have the right count of numbers, which
-are ASCII and finite: the grammar is `xs:double` without its special values, as in urdfdom. Nothing is guessed
-or repaired; every problem is a finding. `urdfkin.urdf.lint` checks the records further.
+Each attribute must have the right count of numbers, which are ASCII and finite: the grammar is `xs:double`
+without its special values, as in urdfdom. Nothing is guessed or repaired; every problem is a finding.
+`urdfkin.urdf.lint` checks the records further.
 """
 
 from __future__ import annotations
@@ -66,25 +65,19 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "UTF-16"),
 )
 
-#: The bytes of '<' in UTF-32 and UTF-16. Without a byte order mark, an XML file in UTF-32 or UTF-16 begins
-#: with these bytes.
+#: An XML file in UTF-32 or UTF-16 without a byte order mark begins with these bytes of '<'.
 _WIDE = ((b"<\0\0\0", "UTF-32"), (b"\0\0\0<", "UTF-32"), (b"<\0", "UTF-16"), (b"\0<", "UTF-16"))
 
 _DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
 _ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
 _XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
 
-#: Encodings in which ASCII characters have the same bytes as in UTF-8.
+#: In these encodings, ASCII characters have the same bytes as in UTF-8.
 _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
 def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
-    """Return the bytes without a byte order mark if they are UTF-8; None after an error.
-
-    Args:
-        report: This object collects the findings.
-        data: The bytes of the file.
-    """
+    """Return the bytes without a byte order mark if they are UTF-8; None after an error."""
     if not data.strip():
         what = "the file is empty" if not data else "the file contains only white space"
         report.add(EMPTY, what, remedy="check the program that wrote the file")
@@ -108,7 +101,6 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
 
 
 def _declared_encoding(text: bytes) -> str | None:
-    """Return the encoding in the XML declaration, as written."""
     declaration = _DECLARATION.match(text.lstrip())
     match = _ENCODING.search(declaration[0]) if declaration else None
     return match[1].decode("ascii", "replace") if match else None
@@ -175,7 +167,7 @@ def _codec(name: str) -> str | None:
 
 
 def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
-    """Return the line and the column of a byte. The first line and the first column have the number 1."""
+    """Return the line and the column of a byte, from 1."""
     before = data[: max(offset, 0)].decode("utf-8", "replace")
     return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
 
@@ -195,21 +187,21 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Largest depth of nested elements in older versions of libxml2.
+#: Older versions of libxml2 accept at most this depth of nested elements.
 COMMON_DEPTH = 256
 _COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
 #: Bytes per call of the parser.
 _PIECE = 1_000_000
 
-#: Number of characters of an element's text that are stored. A message quotes fewer.
+#: The parser stores at most this number of characters of an element's text. A message quotes fewer.
 _STORED = 2 * QUOTED
 
 #: Attributes whose value is the name of a link or joint.
 _NAMES = frozenset({"name", "link", "joint"})
 
 
-class _Stop(Exception):  # noqa: N818  only for control flow
+class _Stop(Exception):  # noqa: N818  the exception is no error of the caller
     """Stop the parser after an error, if urdfkin cannot interpret the rest of the file."""
 
 
@@ -286,7 +278,6 @@ class _Builder:
         self.parser.Parse(b"", True)
 
     def here(self) -> tuple[int, int]:
-        """Return the line and the column of the parser's position."""
         return self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -373,10 +364,7 @@ class _Builder:
             )
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration.
-
-        If it has definitions or refers to external ones, stop the parser.
-        """
+        """Report a document type declaration. If it refers to or has definitions, stop the parser."""
         self.begun = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -414,7 +402,6 @@ class _Builder:
         )
 
     def syntax_error(self, error: expat.ExpatError) -> None:
-        """Report a syntax error with its position and the text at this position."""
         reason = expat.errors.messages[error.code]
         if reason == expat.errors.XML_ERROR_UNDEFINED_ENTITY:
             self.undefined_entity(self._entity_name())
@@ -437,15 +424,11 @@ class _Builder:
         )
 
     def _entity_name(self) -> str | None:
-        """Return the name of the first undefined entity after the position of an error.
-
-        XML defines `lt`, `gt`, `amp`, `quot` and `apos`.
-        """
+        """Return the name of the first entity after an error that XML does not define."""
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
     def _around(self) -> str | None:
-        """Return the text from the position of an error to the end of the line."""
         start = self.parser.ErrorByteIndex
         line = (self.report.data[start : start + 120].splitlines() or [b""])[0]
         text = line.decode("utf-8", "replace")[:30]
@@ -455,7 +438,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: For each message of expat: a clearer message and a remedy.
+#: Each message of expat has a clearer message and a remedy here.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -485,7 +468,7 @@ WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
 UNDERFLOW = Rule("URDF304", "underflow", WARNING)
 NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
 
-#: White space between numbers. Splitting at this pattern takes time linear in the length of the text.
+#: Splitting at this white space takes time linear in the length of the text.
 _BLANKS = re.compile(r"[ \t\r\n]+")
 
 
@@ -493,10 +476,8 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 class NumberReader:
     """Reader of numbers in attributes, which reports invalid numbers.
 
-    Attributes:
-        report: This object collects the findings.
-        bad_number: The rule for an invalid number. The default rule is for numbers that kinematics uses.
-        bad_vector: The rule for an attribute with too few or too many numbers.
+    `bad_number` is the rule for an invalid number, `bad_vector` the rule for a wrong count of numbers. The
+    default rules are for numbers that kinematics uses.
     """
 
     report: Reporter
@@ -577,10 +558,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Return whether a text is too long for a number, and report it.
-
-        Its conversion takes quadratic time.
-        """
+        """Return whether a text is too long for a number, because its conversion takes quadratic time."""
         if len(written) <= most:
             return False
         self.report.add(
@@ -607,7 +585,7 @@ class NumberReader:
     def _report_refused(self, element: Element, attribute: str, what: str) -> None:
         needed = self.bad_number is BAD_NUMBER
         self.report.add(
-            # If kinematics does not use the number, urdfdom ignores the number and accepts the file.
+            # urdfdom accepts a file with a wrong number that kinematics does not use.
             WHITESPACE if needed else self.bad_number,
             f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
             element,
@@ -622,13 +600,13 @@ class NumberReader:
 
 _NOT_ZERO = "123456789"
 
-#: Elements whose tag messages omit.
+#: Messages omit the tags of these elements.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Leading zeros of a character reference. Python cannot convert a number with thousands of zeros.
+#: Python cannot convert a character reference with thousands of leading zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
-#: Pairs of a pattern for an invalid number, and the remedy. The first matching pattern determines the remedy.
+#: The first pattern that matches an invalid number determines the remedy.
 _REMEDIES = (
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*\$[({].*", "expand the xacro first"),
@@ -645,7 +623,6 @@ _REMEDIES = (
 
 
 def _remedy(piece: str) -> str:
-    """Return the remedy for a text that is not a number."""
     found = (text for pattern, text in _REMEDIES if re.fullmatch(pattern, piece, re.IGNORECASE | re.DOTALL))
     return next(found, "write a number such as -1.5 or 2e-3")
 
@@ -673,15 +650,12 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: Shortest and longest length whose square neither underflows nor overflows.
+#: The square of a length between these numbers neither underflows nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150
 
 
 def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
-    """Return the links and joints of a document, or None if the document is not a URDF.
-
-    Each value that cannot be read is reported.
-    """
+    """Return the links and joints of a document, or None if the document is not a URDF."""
     if root.tag != "robot":
         _other_format(report, root)
         return None
@@ -704,7 +678,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     return robot
 
 
-#: For each root element of another format: the remedy.
+#: Remedies for the root elements of other formats.
 _FORMATS = {
     "sdf": "this is an SDF file; convert it to a URDF first",
     "mujoco": "this is an MJCF file; `load` and all other commands read it if its suffix is .xml or .mjcf",
@@ -754,10 +728,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def named(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint.
-
-    If the name is missing, add a finding and return an empty string.
-    """
+    """Return the name of a link or joint; report a missing name and return an empty string."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -772,7 +743,6 @@ def named(report: Reporter, element: Element) -> str:
 
 
 def report_duplicate(report: Reporter, element: Element, first: Element) -> None:
-    """Report a second link or joint with the same name."""
     report.add(
         DUPLICATE_NAME,
         f"another {element.tag} has this name",
@@ -783,19 +753,12 @@ def report_duplicate(report: Reporter, element: Element, first: Element) -> None
 
 
 class JointReader:
-    """Reader of the `<joint>` elements of a file.
-
-    Args:
-        report: The reporter of the file.
-        version: The URDF version of the file.
-    """
-
     def __init__(self, report: Reporter, version: tuple[int, int]) -> None:
         self.report, self.version = report, version
         self.numbers = NumberReader(report)
 
     def read(self, element: Element) -> JointRecord:
-        """Read one joint. If a value cannot be read, report it and store the default value."""
+        """Read one joint. A value that cannot be read is reported, and the record has its default."""
         joint = JointRecord(element, named(self.report, element))
         joint.kind = self._kind(element)
         joint.parent, joint.child = self._end(element, "parent"), self._end(element, "child")
@@ -809,12 +772,7 @@ class JointReader:
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
         """Return a required attribute, or None after a finding that it is missing or empty.
 
-        Args:
-            element: The element.
-            attribute: The name of the attribute.
-            example: An example for the remedy.
-            number: Whether the value of the attribute is a number. If True, this method does not report an
-                empty value, because `NumberReader` reports it.
+        `NumberReader` reports the empty value of a number.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -845,7 +803,6 @@ class JointReader:
         return None
 
     def _end(self, element: Element, tag: str) -> str | None:
-        """Return the link that a joint's `<parent>` or `<child>` names."""
         end = element.first(tag)
         if end is None:
             self.report.add(
@@ -891,7 +848,7 @@ class JointReader:
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):
-            # No reader uses the axis of such a joint. An invalid number in the axis is reported as URDF510.
+            # No reader uses the axis of a fixed or floating joint.
             numbers = NumberReader(self.report, IGNORED, IGNORED)
             numbers.vector(axis, "xyz")
             return
@@ -899,13 +856,13 @@ class JointReader:
             joint.axis = self.numbers.vector(axis, "xyz")
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
-            return  # rule URDF212 reports text between <axis> and </axis>
+            return  # rule URDF212 reports this text
         self.report.add(
             EMPTY_AXIS,
             "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
             axis,
             remedy='write the axis, for example <axis xyz="1 0 0"/>',
-            # A planar joint moves in the XY plane, whatever its axis (URDF505).
+            # A planar joint moves in the XY plane for every axis (URDF505).
             severity=Severity.WARNING if joint.kind == "planar" else None,
         )
 
@@ -941,10 +898,7 @@ class JointReader:
             joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
 
     def _others(self, joint: JointRecord) -> None:
-        """Check elements of a joint that kinematics does not use.
-
-        If such an element is invalid, urdfdom refuses the file.
-        """
+        """Check elements that kinematics does not use. If they are invalid, urdfdom refuses the file."""
         dynamics = joint.element.first("dynamics")
         if dynamics is not None:
             if not {"damping", "friction"} & dynamics.attributes.keys():
@@ -971,11 +925,10 @@ _EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    """Return the known word most similar to `word`, or None."""
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 
-#: Longer words cannot be similar to a tag or attribute name of URDF, so `nearest_tag` returns None for them.
+#: A longer word cannot be similar to a tag or an attribute of URDF.
 _LONGEST_WORD = 32
 
 

@@ -1,7 +1,6 @@
 """Build a `KinematicTree` from the records of a URDF.
 
-`urdfkin.urdf.parser` reads the records, and `urdfkin.urdf.lint` checks them. This module normalises the axes,
-resolves chains of mimic joints, and sorts the joints in Pinocchio's order.
+This module normalises the axes, resolves chains of mimic joints, and sorts the joints in Pinocchio's order.
 """
 
 from __future__ import annotations
@@ -27,52 +26,39 @@ from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRec
 
 
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
-    """Return the kinematic tree of a URDF.
+    """Return the kinematic tree of a URDF, whose records have no errors (see `urdfkin.urdf.lint`).
 
-    Args:
-        urdf: The records of the URDF, without errors (see `urdfkin.urdf.lint`).
-        mimic: True: mimic joints follow their mimicked joints, as URDF defines. False: they move freely.
-        root_joint: `"floating"` or `"planar"` adds a joint `root_joint` of this kind above the root link.
+    With `mimic`, mimic joints follow their mimicked joints, as URDF defines; otherwise they move freely. The
+    kind `root_joint`, "floating" or "planar", adds a joint `root_joint` above the root link.
 
     Raises:
-        InputError: the joints do not form a tree, mimic joints form a cycle, or `root_joint` is not one of
-            its two allowed values.
+        InputError: the joints do not form a tree, mimic joints form a cycle, or `root_joint` is another word.
         UnknownNameError: the mimicked joint of a mimic joint does not exist.
     """
     name = urdf.element.attributes.get("name", "")
     tree = build_tree(name, root_link(name, urdf.links, urdf.joints), joint_rows(urdf.joints, mimic=mimic))
-    return tree if root_joint is None else with_root_joint(tree, _root_kind(root_joint))
+    if root_joint not in (None, "floating", "planar"):
+        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(root_joint))
+    return tree if root_joint is None else with_root_joint(tree, JointKind(root_joint))
 
 
 def joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
     """Return each joint with its mimic rule, its parent link and its child link.
 
-    Raises:
-        InputError: mimic joints form a circle.
-        UnknownNameError: the mimicked joint of a mimic joint does not exist.
+    Raise InputError if mimic joints form a circle, and UnknownNameError if a mimicked joint does not exist.
     """
     rules = _rules(joints) if mimic else {}
     return [(_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
 
 
 def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
-    """Return the link without a parent.
-
-    Raises:
-        InputError: there is no link without a parent, or more than one.
-    """
+    """Return the link without a parent; raise InputError if there is none, or more than one."""
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
         raise InputError(
             "a robot must have one root link", where=name, found=", ".join(sorted(roots)) or "none"
         )
     return roots.pop()
-
-
-def _root_kind(word: str) -> JointKind:
-    if word not in ("floating", "planar"):
-        raise InputError("root_joint must be 'floating', 'planar' or None", found=repr(word))
-    return JointKind(word)
 
 
 def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
@@ -122,9 +108,7 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 
 
 def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
-    """Return the mimic rule of each mimic joint.
-
-    The mimicked joint of each returned rule moves independently.
+    """Return the mimic rule of each mimic joint, relative to a joint that moves independently.
 
     In a file, a mimic joint may follow another mimic joint. This function combines such a chain into one
     rule: y = m2 (m1 x + b1) + b2, where x is not a mimic joint. It combines the rules in the same order as

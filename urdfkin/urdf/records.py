@@ -1,7 +1,7 @@
 """Plain data for the elements, links and joints of a URDF, which `urdf.parser` reads. Size limits of a URDF.
 
-If the parser cannot read a value of a link or joint, it reports a finding, and the value in the record is
-None. If the file omits a value, the record contains the default of the specification.
+If the parser cannot read a value of a link or joint, the value in the record is None. If the file omits a
+value, the record contains the default of the specification.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Largest number of nested elements that Pinocchio accepts. Pinocchio's XML parser, tinyxml2, refuses level
-#: 500, and it counts the document itself as level 1.
+#: Pinocchio accepts at most this number of nested elements.
+#: Pinocchio's XML parser, tinyxml2, refuses level 500 and counts the document itself as level 1.
 ORACLE_DEPTH = 498
 
 
@@ -22,12 +22,11 @@ class Limits:
     Attributes:
         bytes: Size of the file.
         depth: Number of levels of nested elements; urdfdom's parser refuses more.
-        elements: Number of elements.
         attributes: Number of attributes of one element.
         name: Number of characters in the name of an element, an attribute, a link or a joint.
         number: Number of characters of one number.
-        markup: Number of bytes of one tag, comment or processing instruction. urdfkin measures this size to
-            within 10 %. libxml2 has the same limit.
+        markup: Number of bytes of one tag, comment or processing instruction, as in libxml2. urdfkin measures
+            this size to within 10 %.
     """
 
     bytes: int = 100_000_000
@@ -42,7 +41,7 @@ class Limits:
 DEFAULT_LIMITS = Limits()
 
 
-#: Pattern of a start tag, to be matched at an element's offset. A quoted value may contain '>'.
+#: This pattern matches a start tag at an element's offset. A quoted value may contain '>'.
 START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
 ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 
@@ -54,12 +53,9 @@ class Element:
     Attributes:
         tag: The tag as written.
         attributes: The attributes as written.
-        parent: The parent element; None for the root.
         line: The line of the start tag, from 1.
-        column: The column of the start tag.
         offset: The position of the start tag in bytes.
         above: The child of `<robot>` that contains this element; None for the children of `<robot>`.
-        children: The child elements, in file order.
         text: The first characters of the text between the element's tags.
     """
 
@@ -81,7 +77,6 @@ class Element:
             self.children = [child]
 
     def all(self, tag: str) -> list[Element]:
-        """Return the children with a tag."""
         return [child for child in self.children if child.tag == tag]
 
     def first(self, tag: str) -> Element | None:
@@ -108,13 +103,12 @@ class Element:
 
     @property
     def label(self) -> str | None:
-        """The name of the link or joint that contains this element."""
         return self.holder.attributes.get("name") if self.parent is not None else None
 
 
 Vector = tuple[float, ...]
 
-#: Attributes of `<limit>` that URDF defines from version 1.2 on.
+#: URDF defines these attributes of `<limit>` from version 1.2 on.
 FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
 #: Joint types with an axis.
@@ -137,8 +131,6 @@ class LimitRecord:
 
 @dataclass(slots=True)
 class MimicRecord:
-    """A `<mimic>`."""
-
     element: Element
     leader: str
     multiplier: float
@@ -147,8 +139,6 @@ class MimicRecord:
 
 @dataclass(slots=True)
 class JointRecord:
-    """A `<joint>`."""
-
     element: Element
     name: str
     kind: str | None = None
@@ -166,8 +156,6 @@ class JointRecord:
 
 @dataclass(slots=True)
 class RobotRecord:
-    """A `<robot>`: its links and joints, in file order."""
-
     element: Element
     version: tuple[int, int]
     links: dict[str, Element] = field(default_factory=dict)

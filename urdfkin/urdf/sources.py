@@ -24,25 +24,18 @@ USD = (".usd", ".usda", ".usdc", ".usdz")
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The arguments of `load`.
+    """The arguments of `load`, and properties of the source.
 
     Attributes:
         source: A path, a catalogue name, or `-` for standard input. `<text>` and `<bytes>` stand for text,
             bytes and streams without a name.
-        mimic: The argument `mimic`.
-        root_joint: The argument `root_joint`.
-        xacro_args: Names and values of the xacro arguments.
-        oracle: The argument `oracle`: the name of the library that checks the results; None for the default
-            library.
+        oracle: The name of the library that checks the results; None for the default library.
         table: Whether the robot comes from a Denavit-Hartenberg table.
-        sha256: If the source is an MJCF or USD file: the digest of this file. Otherwise empty.
+        sha256: The digest of an MJCF or USD file; empty for other sources.
         lock: Name and value (rad or m) of each locked joint. Mimic joints are not listed; they are locked
             with their mimicked joint.
         variants: Variant sets and variants that were selected in a USD stage.
         articulation: The articulation that was chosen in a USD stage, or None.
-
-    Raises:
-        InputError: `mimic` is neither True, False nor None, or `root_joint` is not a string.
     """
 
     source: str
@@ -134,16 +127,13 @@ Source = str | os.PathLike[str] | bytes | IO[str] | IO[bytes]
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """The bytes of a URDF, and information about the source of these bytes.
+    """The bytes of a URDF, and information about their source.
 
     Attributes:
-        data: The bytes.
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
         source: The path or name from which the source can be read again; for a source without a name,
             `<text>`, `<bytes>` or `<file>`.
-        entry: The catalogue entry, or None.
-        xacro_args: Names and values of the xacro arguments.
-        sha256: If the URDF was converted from an MJCF or USD file: the digest of that file. Otherwise empty.
+        sha256: The digest of the MJCF or USD file from which the URDF was converted; otherwise empty.
         variants: Variant sets and variants that were selected in a USD stage.
         articulation: The articulation that was chosen in a USD stage, or None.
     """
@@ -162,14 +152,8 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     """Read a URDF from any source.
 
     A catalogue name has priority over a file of the same name in the current folder. Write `./panda` for the
-    file.
-
-    Args:
-        source: One of the sources in the module docstring.
-        most: Size limit in bytes; for an open text file, in characters. To detect a source that is too long,
-            the function reads at most one more byte or character. Therefore the function also stops at an
-            infinite device such as `/dev/zero`.
-        xacro_args: Arguments for a .xacro file, which is expanded.
+    file. At most `most` + 1 bytes are read (characters of an open text file), also from an infinite device
+    such as `/dev/zero`. `xacro_args` are for a .xacro file, which is expanded.
 
     Raises:
         SourceError: the file cannot be read.
@@ -203,7 +187,7 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
 
 
 def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Return whether a source is the path of a xacro file, by its suffix.
+    """Return whether the suffix of a path is .xacro.
 
     >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf"), is_xacro("<robot/>")
     (True, False, False)
@@ -212,16 +196,11 @@ def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def is_urdf_path(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Return whether a source is the path of a URDF, by its suffix.
-
-    >>> is_urdf_path("arm.urdf"), is_urdf_path("arm.xacro"), is_urdf_path("<robot/>")
-    (True, False, False)
-    """
     return _suffix(source) == ".urdf"
 
 
 def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Return whether a source is the path of a USD file, by its suffix.
+    """Return whether the suffix of a path is one of USD files.
 
     >>> is_usd("arm.usda"), is_usd("arm.USDZ"), is_usd("arm.urdf"), is_usd("<robot/>")
     (True, True, False, False)
@@ -239,7 +218,7 @@ def _suffix(source: object) -> str:
 
 
 def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
-    from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only .xacro files need it
+    from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only .xacro files need this module
 
     words = {name: str(value) for name, value in arguments.items()}
     return Text(expand(path, words), f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))
@@ -279,8 +258,8 @@ def _in_package(name: str, path: str) -> Path:
 
 
 def _encode(content: str | bytes, label: str, source: str) -> Text:
-    # A Python string may contain a lone surrogate, which UTF-8 does not allow. With "surrogatepass", `encode`
-    # does not raise an error, and the checks of the bytes report the surrogate.
+    # A Python string may contain a lone surrogate, which UTF-8 does not allow.
+    # With "surrogatepass", the checks of the bytes report the surrogate.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return Text(data, label, source)
 
@@ -299,10 +278,7 @@ def _read_file(path: Path, most: int) -> Text:
 
 
 def as_word(path: Path) -> str:
-    """Return a text that `load` interprets as this path.
-
-    `./` is added before a path that would be read as an option, a URDF text or a catalogue name.
-    """
+    """Return a text that `load` reads as this path, not as an option, a URDF text or a catalogue name."""
     word = str(path)
     return f"./{word}" if word.startswith(("-", "<")) or entry_of(word) is not None else word
 

@@ -11,8 +11,8 @@
 - Joints that close a loop, point to nothing or are excluded from the articulation are findings.
 
 A stage may consist of many files, its layers. Before OpenUSD composes the layers, `files_of` reads each layer
-alone. It refuses a layer with a reference to a network address, or to a file outside the robot's folder,
-package and repository.
+separately, and refuses references to network addresses and to files outside the robot's folder, package and
+repository.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -48,45 +49,44 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import MOST, read_start
 from urdfkin.system.lazy_import import install_remedy, installed_version
 from urdfkin.urdf.confinement import Ground
-from urdfkin.urdf.mjcf import UNBOUNDED
+from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, leads, resolve, unique
 from urdfkin.urdf.sources import USD
 
 #: Largest number of layers of a stage.
 _LAYERS = 1_000
 #: Largest number in single precision. A USD file contains this number or infinity if a joint has no limit.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Rounding can make the axes of a frame appear not perpendicular. If the cosine between two axes is at most
-#: `_SHEAR` * u * n, the frame has no shear. Here, n is the number of prims on the path to the prim of the
-#: frame, and u is the largest relative error of rounding to single precision. If a file stores a rotation
-#: matrix, each entry has an error of u. The multiplication of two such matrices in single precision adds an
-#: error of 3 u to each entry. Therefore the scalar product of two columns has an error of at most 4 * 2
-#: sqrt(3) u, which is below 14 u. If a file stores a quaternion, rounding changes the length of the
-#: quaternion by u, and the cosine between two axes by 4 u.
+#: The cosine between two axes of a frame without shear is at most this number times u n.
+#: n is the number of prims on the path to the frame's prim.
+#: u is the largest relative error of rounding to single precision.
+#: Each entry of a stored rotation matrix has an error of u.
+#: The product of two rotation matrices in single precision adds an error of 3 u to each entry.
+#: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
+#: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: Limits of a joint up to this number hold it at one value, whether they are degrees or radians.
+#: A joint with smaller limits hardly moves, whether the limits are in degrees or radians.
 _SMALLEST_ANGLE = 0.01
 _NONE = (-math.inf, math.inf)
-#: First bytes of a file that Git LFS has not fetched.
+#: A file that Git LFS has not fetched begins with these bytes.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: A relationship to the mimicked joint; the group is the direction that the name of PhysX's schema contains.
+#: These relationships name the mimicked joint. The group is the direction in the name of PhysX's schema.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
-#: If the name of a type or of an applied schema contains one of these words, it couples joints or bodies.
+#: A type or applied schema with one of these words in its name couples joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
-#: Endings of the type names of joints that a tree cannot represent.
-#: OpenUSD recognizes such a type as a joint only if the plugin that defines it is installed.
+#: A tree cannot represent joints whose type names end with these words.
+#: OpenUSD recognizes such a joint only if the plugin that defines the type is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Coefficients of the quadratic and higher terms of a MuJoCo joint equality. A mimic rule is linear, so it
-#: cannot contain these terms.
+#: A mimic rule is linear, so it cannot contain these coefficients of a MuJoCo joint equality.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
-#: Names of Xforms that hold the shapes of a body.
+#: Xforms with these names contain the shapes of a body.
 _SHAPES = ("visual", "visuals", "collision", "collisions")
-#: Rotation matrix that turns the up axis y to z.
+#: This rotation matrix turns the up axis y to z.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: The kinds of remarks; `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
+#: The kinds of remarks. `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -98,10 +98,8 @@ class Remark:
     """A part of the stage that the tree does not represent, or that is probably a mistake.
 
     Attributes:
-        kind: The kind.
         where: The path of the prim; empty if the remark is about the whole stage.
         what: A description in one clause.
-        remedy: The remedy, or None.
     """
 
     kind: Kind
@@ -116,15 +114,12 @@ class JointReading:
 
     Attributes:
         free: The free directions, such as `rotZ`.
-        body0: Path of the first body; empty for the world.
-        body1: Path of the second body; empty for the world.
-        p0: (3,) origin of the joint's frame in the first body, m.
-        quat0: (4,) unit quaternion of the joint's frame in the first body, scalar last.
-        p1: (3,) origin of the joint's frame in the second body, m.
-        quat1: (4,) unit quaternion of the joint's frame in the second body, scalar last.
+        body0: Path of the first body; empty for the world. `body1` is the path of the second body.
+        p0: (3,) origin of the joint's frame in the first body, m. `p1` is the origin in the second body.
+        quat0: (4,) unit quaternion of the joint's frame in the first body, scalar last. `quat1` is that in
+            the second body.
         limits: Lower and upper limit, rad or m.
-        size: `p0` and `p1` are sums of vectors. `size` is the sum of the lengths (m) of these vectors, for
-            error bounds.
+        size: Sum of the lengths (m) of the vectors whose sums are `p0` and `p1`, for error bounds.
     """
 
     free: str
@@ -138,7 +133,6 @@ class JointReading:
     size: float
 
     def as_list(self) -> list[Any]:
-        """Return plain data for JSON."""
         return [one.tolist() if isinstance(one, np.ndarray) else one for one in astuple(self)]
 
 
@@ -147,18 +141,15 @@ class Usd:
     """A robot from a USD stage.
 
     Attributes:
-        tree: The links and joints.
-        prims: For each link that represents a prim: the path of the prim.
-        rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up. UsdGeom computes these
-            poses.
+        prims: The path of the prim of each link that represents a prim.
+        rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
         rest_q: (nq,) configuration of the robot in the stage.
-        single: For each joint name: five numbers that describe the effect of rounding to single precision.
+        single: Five numbers for each joint name that describe the effect of rounding to single precision.
             Number 1: a bound (m) on the error of the joint origins. Number 2: a bound (rad) on the error of
             the joint orientations. Number 3: the sum of the lengths (m) of the vectors that these orientation
             errors rotate. Number 4: a bound on the relative error of the joint value if a mimic rule computes
             it, otherwise 0. Number 5: the distance (m) between the joint frame and the frame of the child.
-        joints: The numbers of each joint prim of the tree. The key is the path of the prim.
-        stage: The stage.
+        joints: The numbers of each joint prim of the tree, by the path of the prim.
         unit: metersPerUnit.
         remarks: Parts of the stage that the tree does not represent, and probable mistakes.
         files: The files of the stage.
@@ -185,29 +176,20 @@ def version() -> str:
 
 
 def library() -> Any:
-    """Return the modules of OpenUSD, as the attributes of one object.
-
-    Raises:
-        InputError: OpenUSD is not installed.
-    """
+    """Return the modules of OpenUSD as attributes of one object; raise InputError without OpenUSD."""
     try:
-        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  an extra, and heavy
+        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  this import is slow
     except ImportError:
         raise InputError("OpenUSD is not installed", remedy=install_remedy("usd")) from None
-    return type(
-        "OpenUSD",
-        (),
-        {"Ar": Ar, "Gf": Gf, "Sdf": Sdf, "Tf": Tf, "Usd": Usd, "UsdGeom": UsdGeom, "UsdPhysics": UsdPhysics},
-    )
+    return SimpleNamespace(Ar=Ar, Gf=Gf, Sdf=Sdf, Tf=Tf, Usd=Usd, UsdGeom=UsdGeom, UsdPhysics=UsdPhysics)
 
 
 def files_of(pxr: Any, path: str) -> tuple[str, ...]:
-    """Return the files of a stage. Each layer is read alone, before its references are followed.
+    """Return the files of a stage. Each layer is read separately, before its references are followed.
 
     Raises:
-        InputError: there are too many layers, or a layer has a reference that is not allowed. These are
-            network addresses, expressions, files that are not USD, and files outside the robot's folder,
-            package and repository.
+        InputError: there are too many layers, or a layer has a reference to a network address, an expression,
+            a file that is not USD, or a file outside the robot's folder, package and repository.
         SourceError: a file is too large, or not a regular file.
     """
     ground = Ground.around(Path(path), [], [])
@@ -243,7 +225,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Refuse value clips. USD does not list the files of value clips as dependencies of a layer."""
+    """Refuse value clips, because USD does not list their files as dependencies of a layer."""
     found: list[str] = []
 
     def look(path: Any) -> None:
@@ -268,18 +250,18 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
         raise _refused("a reference is an address, and urdfkin fetches nothing", where, written)
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
-    if not os.path.isabs(outer):  # noqa: PTH117  OpenUSD finds no such file beside the layer
-        # OpenUSD would look in the current folder too
-        here = os.path.abspath(outer)  # noqa: PTH100  `Ground.holds` resolves links
+    if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
+        # OpenUSD finds no such file beside the layer, and would look in the current folder.
+        here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
-        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  not every name is a path
+        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  a name may be no path
     if not ground.holds(outer):
         raise _refused(
             "a reference leads outside the folder, package and repository of the stage", where, written
         )
     if Path(inner or outer).suffix.lower() not in USD:
         raise _refused("a reference names a file that is not USD", where, written)
-    return address if os.path.exists(outer) else None  # noqa: PTH110  not every name is a path
+    return address if os.path.exists(outer) else None  # noqa: PTH110  a name may be no path
 
 
 def _refused(what: str, where: str, found: str) -> InputError:
@@ -293,7 +275,7 @@ def _refused(what: str, where: str, found: str) -> InputError:
 
 def _size(path: str, where: str) -> int:
     try:
-        found = os.stat(path)  # noqa: PTH116  not every name is a path
+        found = os.stat(path)  # noqa: PTH116  a name may be no path
     except OSError as error:
         raise SourceError("the file cannot be read", where=path, found=error.strerror) from None
     if not stat.S_ISREG(found.st_mode):
@@ -308,12 +290,8 @@ def read_usd(
 ) -> Usd:
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
-    Args:
-        path: The file.
-        name: The name of the file in messages.
-        variants: Pairs (variant set, variant). For one pair after the other, the variant is selected in all
-            prims that have the variant set.
-        articulation: Path or name of the articulation to read; None if there is only one.
+    For one pair of `variants` after the other, the variant is selected in all prims that have the variant
+    set. `articulation` is the path or name of the articulation to read; None if there is only one.
 
     Raises:
         InputError: OpenUSD is not installed or does not accept the file, a reference is refused, the robot
@@ -339,14 +317,11 @@ def read_usd(
 
 
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
-    """Select variants in the session layer, so that no file changes.
+    """Select variants in the session layer, so that no file changes; return the paths of expanded instances.
 
     OpenUSD cannot select a variant inside an instance. If an instance contains the variant set, this function
-    therefore makes the prim non-instanceable, also in the session layer. This operation expands the instance.
-    Return the paths of the expanded instances.
-
-    Raises:
-        UnknownNameError: no prim has such a variant set, or such a variant.
+    therefore makes the prim non-instanceable, also in the session layer, which expands the instance. Raise
+    UnknownNameError if no prim has such a variant set, or such a variant.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     opened = set[str]()
@@ -394,8 +369,8 @@ class _Body:
 class _Edge:
     """A joint prim.
 
-    `ends` contains the paths of the two bodies that the joint connects; None is the world. `frames` contains
-    two poses of the joint frame: its pose in the first body, and its pose in the second body.
+    `ends` are the paths of the two bodies that the joint connects; None is the world. `frames` are the poses
+    of the joint frame in these bodies.
     """
 
     prim: Any
@@ -419,10 +394,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _Reader:
-    """Reader of one stage.
-
-    `source` is the stage's name in messages. `opened` contains the paths of the expanded instances.
-    """
+    """Reader of one stage. `source` is its name in messages, `opened` the paths of expanded instances."""
 
     pxr: Any
     stage: Any
@@ -433,10 +405,9 @@ class _Reader:
     _edges: list[_Edge] = field(default_factory=list)
     _read: dict[str, JointReading] = field(default_factory=dict)
     _single: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
-    # `root_joint` and `universe` are Pinocchio's names of the joint and the link of a moving base
-    _names: dict[str, set[str]] = field(
-        default_factory=lambda: {"link": {"universe"}, "joint": {"root_joint"}}
-    )
+    # `root_joint` and `universe` are Pinocchio's names for a moving base.
+    _link_names: set[str] = field(default_factory=lambda: {"universe"})
+    _joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
     _unit: float = 1.0
     _up: FloatArray = field(default_factory=lambda: np.eye(3))
     _cache: Any = None
@@ -444,7 +415,6 @@ class _Reader:
     _looked_at: set[str] = field(default_factory=set)
 
     def read(self, articulation: str | None, files: tuple[str, ...]) -> Usd:
-        """Return the robot."""
         pxr, stage = self.pxr, self.stage
         self._unit = float(pxr.UsdGeom.GetStageMetersPerUnit(stage))
         if not (math.isfinite(self._unit) and self._unit > 0.0):
@@ -581,7 +551,6 @@ class _Reader:
         return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._unit), scale
 
     def _collect(self, prims: list[Any]) -> None:
-        """Collect the bodies and the joints of the stage."""
         physics = self.pxr.UsdPhysics
         for prim in prims:
             if (
@@ -592,12 +561,8 @@ class _Reader:
             path = str(prim.GetPath())
             T, scale = self._placed(prim)
             if scale[0] < 0.0:
-                self._say(
-                    "mirrored-body",
-                    path,
-                    "the transform of this body mirrors it",
-                    "mirror the shapes instead",
-                )
+                what = "the transform of this body mirrors it"
+                self._say("mirrored-body", path, what, "mirror the shapes instead")
             self._bodies[path] = _Body(path, T, scale, self._owner(prim))
         for prim in prims:
             if prim.IsA(physics.Joint) and (edge := self._edge(prim)) is not None:
@@ -614,7 +579,7 @@ class _Reader:
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
             self._say("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # "newton:mimicJoint", or "physxMimicJoint:rotX:referenceJoint" with any direction
+            # The direction in "physxMimicJoint:rotX:referenceJoint" may be another one.
             own = _MIMIC_RULE.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
@@ -626,19 +591,17 @@ class _Reader:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # `MjcEqualityJointAPI` repeats the rule of `NewtonMimicAPI`, and may add terms of higher
-                # degree
+                # This schema repeats the rule of `NewtonMimicAPI`, and may add terms of higher degree.
                 if more := [name for name in _HIGHER if self._value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._say("left-out-of-usd", path, what)
                 continue
             unread.append(schema)
-        # if the joint is not in the tree, `remarks` already contains the reason
+        # If the joint is not in the tree, `remarks` already contains the reason.
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _owner(self, prim: Any) -> str | None:
-        """Return the path of the articulation root that contains a prim: the prim or its nearest ancestor."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 return str(prim.GetPath())
@@ -648,10 +611,7 @@ class _Reader:
     # -- joints --------------------------------------------------------------------------------------
 
     def _edge(self, prim: Any) -> _Edge | None:
-        """Return a joint that connects two bodies, or a body and the world.
-
-        If the prim is not such a joint, report it and return None.
-        """
+        """Return a joint that connects two bodies, or a body and the world; report any other joint."""
         path = str(prim.GetPath())
         if self._value(prim, "physics:jointEnabled") is False:
             self._say("left-out-of-usd", path, "this joint is disabled")
@@ -696,10 +656,7 @@ class _Reader:
         return edge
 
     def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
-        """Convert a pose in the world (`body` is None) to the stage's up axis.
-
-        Return a pose in a body unchanged.
-        """
+        """Convert a pose in the world (`body` is None) to the stage's up axis; other poses stay unchanged."""
         return T if body is not None else pose(self._up.T) @ T
 
     def _side(
@@ -747,12 +704,8 @@ class _Reader:
 
         The bounds are 0 if the file stores all transforms in double precision. If the file stores a rotation
         in single precision, rounding rotates the prim, and moves the prims below. The function ignores
-        transforms in half precision.
-
-        Args:
-            path: Path of the prim.
-            body: Path of the body; None is the world.
-            length: Sum of the lengths (m) of the translations from the body to the prim.
+        transforms in half precision. `length` is the sum of the lengths (m) of the translations from the body
+        to the prim. The body None is the world.
         """
         moved = turned = False
         geometry, prim = self.pxr.UsdGeom, self.stage.GetPrimAtPath(path)
@@ -775,8 +728,7 @@ class _Reader:
     def _motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return the kind, the axis, the limits (rad or m) and the free directions of a joint.
 
-        Raises:
-            InputError: urdfkin has no such joint.
+        Raise InputError if urdfkin has no such joint.
         """
         physics, path = self.pxr.UsdPhysics, f"{self.source}: joint {prim.GetPath()}"
         if prim.IsA(physics.FixedJoint):
@@ -841,9 +793,8 @@ class _Reader:
     def _end(self, prim: Any, name: str) -> float:
         """Return the lower or upper limit of a `PhysicsJoint` in one of its six directions.
 
-        Raises:
-            InputError: a layer of the stage contains `None` for the limit. OpenUSD's parser of UsdPhysics
-                does not replace `None` by the default value, unlike other readers.
+        Raise InputError if a layer of the stage contains `None` for the limit. OpenUSD's parser of UsdPhysics
+        does not replace `None` by the default value, unlike other readers.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
@@ -897,11 +848,9 @@ class _Reader:
                     continue
                 owners = {one for one in (owner[a], owner[b]) if one is not None}
                 if len(owners) > 1:
-                    self._say(
-                        "outside-joint",
-                        edge.path,
-                        f"this {_called(edge)} connects two articulations: {' and '.join(sorted(owners))}",
-                    )
+                    ours = " and ".join(sorted(owners))
+                    what = f"this {_called(edge)} connects two articulations: {ours}"
+                    self._say("outside-joint", edge.path, what)
                     continue
                 above[b] = a
                 owner[a] = next(iter(owners), None)
@@ -915,7 +864,7 @@ class _Reader:
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # a single body that is fixed to the world is not a robot
+        # A single body that is fixed to the world is not a robot.
         found = [
             group
             for group in groups.values()
@@ -923,14 +872,14 @@ class _Reader:
         ]
         for group in found:
             self._name(group)
-        # if the base of an articulation is not a rigid body, several groups are attached to the world
+        # If the base of an articulation is not a rigid body, several groups are attached to the world.
         merged: dict[str, list[_Articulation]] = {}
         for group in found:
             merged.setdefault(self._root(group) or group.path, []).append(group)
         found = [own[0] if len(own) == 1 else self._together(own, path) for path, own in merged.items()]
         paths = Counter(group.path for group in found)
         for group in found:
-            if paths[group.path] > 1:  # a joint between them is missing: name each by its root body
+            if paths[group.path] > 1:  # a joint between these groups is missing
                 group.path = self._root(group) or group.bodies[0]
         return found
 
@@ -943,10 +892,7 @@ class _Reader:
         group.path = group.path or self._root(group) or group.bodies[0]
 
     def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
-        """Return the articulation with the path or name `wanted`.
-
-        If `wanted` is the path of another prim, merge all articulations below it.
-        """
+        """Return the articulation with a path or name, or all articulations below another prim."""
         if not found:
             raise InputError(
                 "this stage has no joint between bodies",
@@ -998,7 +944,6 @@ class _Reader:
     # -- the tree ------------------------------------------------------------------------------------
 
     def _tree(self, group: _Articulation) -> tuple[KinematicTree, dict[str, str]]:
-        """Return the tree of an articulation, and the prim of each link."""
         root = self._root(group)
         around: dict[str | None, list[_Edge]] = {}
         for edge in group.edges:
@@ -1020,28 +965,27 @@ class _Reader:
                 reached.add(there)
                 ordered.append((edge, backwards))
                 open_.append(there)
-        links: dict[str | None, str] = {None: self._new("link", "world")} if root is None else {}
+        links: dict[str | None, str] = {None: unique("world", self._link_names)} if root is None else {}
         for path in [root, *(edge.ends[0 if back else 1] for edge, back in ordered)]:
             if path is not None:
-                links[path] = self._new("link", self._short(path))
-        names = {edge.path: self._new("joint", edge.name) for edge, _ in ordered}
+                links[path] = unique(self._short(path), self._link_names)
+        names = {edge.path: unique(edge.name, self._joint_names) for edge, _ in ordered}
         joints = [made for edge, back in ordered for made in self._joints(edge, names, links, backwards=back)]
         rules = dict(self._mimics([edge for edge, _ in ordered], names))
         joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in joints]
-        if outside := [edge for edge, _ in ordered if self._is_outside(edge, group)]:
-            for edge in outside:
-                self._say(
-                    "outside-joint", edge.path, f"this {_called(edge)} leads to a body outside {group.path}"
-                )
+        for edge, _ in ordered:
+            if self._is_outside(edge, group):
+                what = f"this {_called(edge)} leads to a body outside {group.path}"
+                self._say("outside-joint", edge.path, what)
         prims = {link: path for path, link in links.items() if path is not None}
         for path, parent in self._frames(list(prims.values())):
-            link = self._new("link", path.rpartition("/")[2])
+            link = unique(path.rpartition("/")[2], self._link_names)
             try:
                 T = inverse(self._bodies[parent].T) @ self._placed(self.stage.GetPrimAtPath(path))[0]
             except InputError as error:
                 self._say("unused-in-usd", path, f"this Xform is no link: {error.what}", error.remedy)
                 continue
-            joint = Joint(self._new("joint", f"{link}_fixed"), JointKind.FIXED, 0, T, _unit(0))
+            joint = fixed_joint(unique(f"{link}_fixed", self._joint_names), T)
             self._single[joint.name] = *self._stored(path, parent, joint.length), joint.length, 0.0, 0.0
             joints.append((joint, links[parent], link))
             prims[link] = path
@@ -1070,13 +1014,6 @@ class _Reader:
                 return "_".join(parts[-n:])
         return parts[-1]
 
-    def _new(self, kind: str, name: str) -> str:
-        """Return the name, with underscores appended until it is unique."""
-        while name in self._names[kind]:
-            name += "_"
-        self._names[kind].add(name)
-        return name
-
     def _joints(
         self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
@@ -1090,7 +1027,7 @@ class _Reader:
         self._single[names[edge.path]] = *edge.rounded, edge.size, shares, lever
         name, here, there = names[edge.path], links[parent], links[child]
         if edge.kind is JointKind.FIXED:
-            yield Joint(name, JointKind.FIXED, 0, A @ inverse(B), _unit(0)), here, there
+            yield fixed_joint(name, A @ inverse(B)), here, there
             return
         if edge.kind in (JointKind.PLANAR, JointKind.FLOATING):
             if backwards or (edge.kind is JointKind.FLOATING and parent is not None):
@@ -1119,36 +1056,20 @@ class _Reader:
         if direct:
             yield joint, here, there
             return
-        between = self._new("link", f"{joint.name}_link")
+        between = unique(f"{joint.name}_link", self._link_names)
         yield joint, here, between
-        yield (
-            Joint(self._new("joint", f"{there}_fixed"), JointKind.FIXED, 0, inverse(B), _unit(0)),
-            between,
-            there,
-        )
+        yield fixed_joint(unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
 
     def _limit(self, edge: _Edge) -> Limit | None:
         lower, upper = edge.limits
         turns, prim = edge.kind is not JointKind.PRISMATIC, edge.prim
-        rate = next(
-            (
-                float(x)
-                for x in (
-                    self._value(prim, word)
-                    for word in ("newton:velocityLimit", "physxJoint:maxJointVelocity")
-                )
-                if x is not None
-            ),
-            math.inf,
-        )
+        rates = (self._value(prim, name) for name in ("newton:velocityLimit", "physxJoint:maxJointVelocity"))
+        rate = next((float(x) for x in rates if x is not None), math.inf)
         rate = math.inf if not 0.0 < rate < _LARGEST else rate * (math.pi / 180.0 if turns else self._unit)
         if edge.kind is JointKind.CONTINUOUS:
             if math.isfinite(lower) or math.isfinite(upper):
-                self._say(
-                    "unused-in-usd",
-                    edge.path,
-                    "only a lower or only an upper limit; a URDF has both or none, so it has none",
-                )
+                what = "the joint has only one limit; a URDF has both limits or none, so it has none"
+                self._say("unused-in-usd", edge.path, what)
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
         if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
@@ -1158,14 +1079,9 @@ class _Reader:
                 "write the limits in degrees",
             )  # fmt: skip
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            self._say(
-                "unused-in-usd",
-                edge.path,
-                f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m",
-            )
-            lower, upper = (
-                end if math.isfinite(end) else math.copysign(UNBOUNDED, end) for end in (lower, upper)
-            )
+            what = f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m"
+            self._say("unused-in-usd", edge.path, what)
+            lower, upper = (x if math.isfinite(x) else math.copysign(UNBOUNDED, x) for x in (lower, upper))
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -1207,35 +1123,25 @@ class _Reader:
     def _mimics(self, edges: Sequence[_Edge], names: Mapping[str, str]) -> Iterator[tuple[str, Mimic]]:
         """Yield the mimic rules of Newton and PhysX; chains are resolved."""
         by_path = {edge.path: edge for edge in edges}
-        rules: dict[str, tuple[str, float, float]] = {}
+        rules: dict[str, Mimic] = {}
         for edge in edges:
             for rule in self._rules(edge):
-                leader = by_path.get(rule[0])
+                leader = by_path.get(rule.leader)
                 if leader is None or leader.kind.nq != 1 or edge.kind.nq != 1 or leader is edge:
-                    self._say(
-                        "lost-mimic",
-                        edge.path,
-                        f"this joint mimics {rule[0] or 'nothing'}, which is no joint with one coordinate",
-                        "correct the relationship",
-                    )
-                elif edge.path in rules or _leads(rules, rule[0], edge.path):
-                    self._say(
-                        "lost-mimic",
-                        edge.path,
-                        "this joint has two mimic rules, or its rules form a circle",
-                        "remove a rule",
-                    )
+                    named = rule.leader or "nothing"
+                    what = f"this joint mimics {named}, which is no joint with one coordinate"
+                    self._say("lost-mimic", edge.path, what, "correct the relationship")
+                elif edge.path in rules or leads(rules, rule.leader, edge.path):
+                    what = "this joint has two mimic rules, or its rules form a circle"
+                    self._say("lost-mimic", edge.path, what, "remove a rule")
                 else:
                     rules[edge.path] = rule
-        for path, rule in rules.items():
-            leader_path, multiplier, offset = rule
-            while leader_path in rules:
-                further, m, c = rules[leader_path]
-                leader_path, multiplier, offset = further, multiplier * m, multiplier * c + offset
-            yield names[path], Mimic(names[leader_path], multiplier, offset)
+        for path in rules:
+            rule = resolve(rules, path)
+            yield names[path], replace(rule, leader=names[rule.leader])
 
-    def _rules(self, edge: _Edge) -> Iterator[tuple[str, float, float]]:
-        """Yield each mimic rule of a joint: (path of the mimicked joint, multiplier, offset in rad or m)."""
+    def _rules(self, edge: _Edge) -> Iterator[Mimic]:
+        """Yield each mimic rule of a joint, with the path of the mimicked joint, in rad or m."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
@@ -1245,7 +1151,8 @@ class _Reader:
             leader = _target(prim, "newton:mimicJoint")
             c0, c1 = self._value(prim, "newton:mimicCoef0"), self._value(prim, "newton:mimicCoef1")
             multiplier, offset = 1.0 if c1 is None else float(c1), 0.0 if c0 is None else float(c0)
-            yield leader, multiplier * self._ratio(edge, leader), offset * own
+            self._compare_units(edge, leader)
+            yield Mimic(leader, multiplier, offset * own)
             return
         for schema in schemas:
             base, _, freedom = schema.partition(":")
@@ -1256,13 +1163,13 @@ class _Reader:
                 self._value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
             )
             multiplier = -1.0 if gearing is None else -float(gearing)
-            yield leader, multiplier * self._ratio(edge, leader), -float(offset or 0.0) * own
+            self._compare_units(edge, leader)
+            yield Mimic(leader, multiplier, -float(offset or 0.0) * own)
 
     def _factor(self, kind: JointKind) -> float:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
-    def _ratio(self, edge: _Edge, leader: str) -> float:
-        """Return 1, the unit factor of a multiplier. Report a mimic rule between an angle and a length."""
+    def _compare_units(self, edge: _Edge, leader: str) -> None:
         kinds = {edge.path: edge.kind for edge in self._edges}
         slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
         if len(slides) > 1:
@@ -1272,22 +1179,16 @@ class _Reader:
                 "a mimic rule between an angle and a length has no unit in the schema; m and rad are used",
                 "compare the joint with the simulator",
             )
-        return 1.0
 
     # -- the whole -----------------------------------------------------------------------------------
 
     def _loose(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
-        """Report bodies near the robot that no joint connects with it."""
         joined = {path for group in found for path in group.bodies}
         top = f"/{chosen.path.split('/')[1]}/".replace("//", "/")
         for path in self._bodies:
             if path not in joined and (path + "/").startswith(top):
-                self._say(
-                    "loose-body",
-                    path,
-                    "no joint connects this body with the robot",
-                    "add a joint, or remove PhysicsRigidBodyAPI",
-                )
+                what = "no joint connects this body with the robot"
+                self._say("loose-body", path, what, "add a joint, or remove PhysicsRigidBodyAPI")
 
     def _rest(
         self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
@@ -1316,22 +1217,13 @@ class _Reader:
         return q
 
     def _of_the_stage(self, rest: FloatArray) -> None:
-        geom = self.pxr.UsdGeom
         if not self.stage.HasAuthoredMetadata("metersPerUnit"):
             size = float(np.ptp(rest[:, :3, 3], axis=0).max(initial=0.0))
-            self._say(
-                "unit-scale",
-                "",
-                f"the stage has no metersPerUnit, so a unit is a centimetre: the robot spans {size:.3g} m",
-                "write metersPerUnit = 1 if lengths are metres",
-            )
+            what = f"the stage has no metersPerUnit, so a unit is a centimetre: the robot spans {size:.3g} m"
+            self._say("unit-scale", "", what, "write metersPerUnit = 1 if lengths are metres")
         if not self.stage.HasAuthoredMetadata("upAxis"):
-            self._say(
-                "up-axis",
-                "",
-                f"the stage has no upAxis, so {geom.GetStageUpAxis(self.stage)} is up",
-                'write upAxis = "Z"',
-            )
+            what = f"the stage has no upAxis, so {self.pxr.UsdGeom.GetStageUpAxis(self.stage)} is up"
+            self._say("up-axis", "", what, 'write upAxis = "Z"')
 
     def _layers(self, paths: Sequence[str]) -> None:
         """Report each layer that describes one of the prims in another unit or up axis than the stage."""
@@ -1347,10 +1239,7 @@ class _Reader:
                     self._layer(layer.pseudoRoot, name, prim)
 
     def _layer(self, root: Any, name: str, prim: Any) -> None:
-        """Compare the unit and the up axis of a layer with the stage.
-
-        `prim` is the first prim in the layer.
-        """
+        """Compare the unit and the up axis of a layer, whose first prim is `prim`, with the stage."""
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
@@ -1391,12 +1280,8 @@ class _Reader:
         return False
 
     def _unused(self, prims: list[Any]) -> None:
-        counts: dict[str, int] = {}
-        for prim in prims:
-            if prim.IsA(self.pxr.UsdGeom.Gprim):
-                counts["shapes"] = counts.get("shapes", 0) + 1
-        if counts:
-            self._say("unused-in-usd", "", f"kinematics does not use the {counts['shapes']} shapes")
+        if count := sum(prim.IsA(self.pxr.UsdGeom.Gprim) for prim in prims):
+            self._say("unused-in-usd", "", f"kinematics does not use the {count} shapes")
 
 
 def _rounding(x: FloatArray) -> FloatArray:
@@ -1443,9 +1328,3 @@ def _unit(i: int) -> FloatArray:
 
 def _called(edge: _Edge) -> str:
     return f"{edge.kind.value} joint"
-
-
-def _leads(rules: Mapping[str, tuple[str, float, float]], joint: str, to: str) -> bool:
-    while joint in rules and joint != to:
-        joint = rules[joint][0]
-    return joint == to

@@ -1,11 +1,9 @@
 """Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
-Each number in the text is written with enough digits to restore the same double. A joint's rotation is
-written as roll, pitch and yaw. A program that reads roll, pitch and yaw computes the same rotation up to
-rounding.
+Each number has enough digits to restore the same double. A joint's rotation is written as roll, pitch and
+yaw, from which a program computes the same rotation up to rounding.
 
-An insertion is an `Edit`. Its position is computed from `Element.offset`, which does not count a byte order
-mark. The inserted text has the indentation and line ends of the text around it.
+The position of an insertion is computed from `Element.offset`, which does not count a byte order mark.
 """
 
 from __future__ import annotations
@@ -26,9 +24,6 @@ def to_urdf(tree: KinematicTree) -> str:
 
     URDF 1.0 has no notation for an infinite effort or velocity limit. If a joint has an infinite limit, the
     file therefore declares version 1.2, in which the attribute may be missing.
-
-    Args:
-        tree: The robot.
 
     Raises:
         InputError: a revolute or prismatic joint has no finite limits, or XML does not allow a character of a
@@ -109,11 +104,7 @@ _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;",
 
 
 def attribute(text: str) -> str:
-    """Escape a text as the value of an attribute.
-
-    Raises:
-        InputError: The text contains a character that XML does not allow.
-    """
+    """Escape the value of an attribute; raise InputError for a character that XML does not allow."""
     bad = next((c for c in text if not _is_xml(c)), None)
     if bad is not None:
         raise InputError("XML does not allow this character", where=repr(text), found=f"U+{ord(bad):04X}")
@@ -148,9 +139,6 @@ def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iter
 
 
 def before(data: bytes, at: Element, element: str) -> Edit:
-    """Return the edit that inserts a new element before another element.
-
-    If the other element begins a line, the new element gets a line of its own.
-    """
+    """Return the edit that inserts an element before another element, with the same indentation."""
     indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
     return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))

@@ -1,13 +1,11 @@
 """Expand a .xacro file to URDF text, in a separate process with restricted rights.
 
 A xacro file is a program, and may come from an untrusted source. `expanding` is the code of the separate
-process. docs/xacro.md lists the operations that a file may do. `urdfkin.urdf.catalogue` finds packages
-without ROS.
+process. docs/xacro.md lists the operations that a file may do.
 
 xacro ignores an argument that the file does not declare; urdfkin raises an error. To find the declared
-arguments, the separate process reads the file and its includes. An include cannot be read if its name is
-computed, if the file is not found, or if the file is not allowed. If an include cannot be read, urdfkin does
-not know all declared arguments, so it accepts any argument of the user.
+arguments, the separate process reads the file and its includes. If the name of an include is computed, or if
+the include is not found or not allowed, urdfkin accepts any argument of the user.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ import json
 import os
 import re
 import xml.etree.ElementTree as Xml
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from importlib.util import find_spec
 from math import ceil
@@ -31,10 +29,10 @@ from urdfkin.urdf.catalogue import VARIABLES
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError
 
-#: Limits of the search for declared arguments: the size of one file in bytes, and the number of files.
+#: The search for declared arguments reads files of at most this size, and at most this number of files.
 MOST_ARGUMENTS, MOST_FILES = 10_000_000, 200
 
-#: A function that returns the folder of a package, or raises LookupError.
+#: The function returns the folder of a package, or raises LookupError.
 Find = Callable[[str], str]
 
 _USED = re.compile(r"\$\(arg\s+([^\s()]+)\s*\)")
@@ -42,30 +40,10 @@ _FIND = re.compile(r"\$\(find\s+([^\s()]+)\s*\)")
 _COMPUTED = re.compile(r"\$[({]|[*?\[]")
 
 
-def check_arguments(path: Path, given: Iterable[str], known: Collection[str] | None) -> None:
-    """Refuse arguments that a xacro file neither declares nor uses.
-
-    Args:
-        path: The file.
-        given: Names of the arguments that the user passed.
-        known: The names that `arguments_of` returned. None: every argument is accepted.
-
-    Raises:
-        UnknownNameError: an argument is not among the known names, which the message lists.
-    """
-    if known is not None and (unknown := [name for name in given if name not in known]):
-        raise UnknownNameError("xacro argument", unknown[0], known, where=str(path))
-
-
 def arguments_of(path: Path, find: Find) -> set[str] | None:
-    """Return the names in `<xacro:arg>` and `$(arg)` of a file and its includes.
+    """Return the names in `<xacro:arg>` and `$(arg)` of a file and its includes, or None.
 
-    Args:
-        path: The file.
-        find: A function that returns the folder of a package.
-
-    Returns:
-        The names, or None if an include cannot be read.
+    The result is None if an include cannot be read.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     while files:
@@ -110,7 +88,7 @@ def _included_file(name: str, beside: Path, find: Find) -> Path | None:
     return None if _COMPUTED.search(name) or not name else folder / name
 
 
-#: Time limit of an expansion in seconds. This limit is needed because a macro may call itself without end.
+#: An expansion ends after this time in seconds, because a macro may call itself without end.
 PATIENCE = 60.0
 
 #: Size limit of the answer in bytes.
@@ -118,22 +96,18 @@ MOST = 100_000_000
 
 
 class XacroError(UrdfkinError):
-    """A xacro file cannot be expanded."""
+    pass
 
 
 def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIENCE) -> bytes:
     """Return the URDF of a xacro file, as UTF-8.
 
-    Args:
-        path: The file.
-        arguments: Values for the arguments that the file declares by `<xacro:arg>`.
-        patience: Time limit in seconds.
-
     Raises:
         SourceError: the file does not exist.
         UnknownNameError: the file does not declare an argument.
         XacroError: xacrodoc is not installed, or xacro cannot expand the file. For example, the xacro code
-            opens a forbidden file, starts a program, or needs too much memory or time.
+            opens a forbidden file, starts a program, or needs too much memory or more than `patience`
+            seconds.
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))
@@ -152,41 +126,39 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError("the expanded URDF is too long", where=str(path), found=f"more than {MOST} bytes")
     answer = _answer(output)
     if "urdf" in answer:
-        takes = answer.get("takes")
-        check_arguments(path, arguments, [str(name) for name in takes] if isinstance(takes, list) else None)
+        if isinstance(takes := answer.get("takes"), list):
+            known = [str(name) for name in takes]
+            if unknown := [name for name in arguments if name not in known]:
+                raise UnknownNameError("xacro argument", unknown[0], known, where=str(path))
         return str(answer["urdf"]).encode()
     reason = answer.get("error") or f"the process of xacro ended with status {status}"
     raise XacroError(
         "xacro cannot expand the file",
         where=str(path),
         found=str(reason).strip() or None,
-        remedy="give arguments with --xacro-arg NAME:=VALUE; packages are found by ROS_PACKAGE_PATH,"
-        " AMENT_PREFIX_PATH and, if they contain a package.xml, beside the folders above the file;"
+        remedy="set arguments with --xacro-arg NAME:=VALUE, and the folders of packages in ROS_PACKAGE_PATH;"
         " docs/xacro.md lists the operations that a file may do",
         question=Question.XACRO,
     )
 
 
 def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes:
-    search = {name: _absolute(os.environ.get(name, "")) for name in VARIABLES}
-    installed = [entry for entries in search.values() for entry in entries.split(os.pathsep) if entry]
+    paths = {
+        name: [str(Path(one).absolute()) for one in os.environ.get(name, "").split(os.pathsep) if one]
+        for name in VARIABLES
+    }
+    installed = [entry for entries in paths.values() for entry in entries]
     request = {
         "path": str(path),
         "arguments": dict(arguments),
-        "search": search,
+        "search": {name: os.pathsep.join(entries) for name, entries in paths.items()},
         "ground": asdict(Ground.around(path, installed, list(arguments.values()))),
         "seconds": ceil(patience) + 1,
     }
     return json.dumps(request).encode()
 
 
-def _absolute(entries: str) -> str:
-    """Make the entries of a search path absolute."""
-    return os.pathsep.join(str(Path(entry).absolute()) for entry in entries.split(os.pathsep) if entry)
-
-
 def _answer(output: bytes) -> dict[str, Any]:
-    """Return the JSON object in the last line of the output, or an empty dict."""
     try:
         answer = json.loads(output.splitlines()[-1])
     except (IndexError, ValueError):

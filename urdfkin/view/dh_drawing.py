@@ -23,19 +23,14 @@ from urdfkin.view.figure import BLUE, ORANGE, VERMILION, label, new_figure, styl
 
 _X, _Z, _D, _A, _AXIS, _TEXT = VERMILION, BLUE, "#6b7280", ORANGE, "#9aa7b5", "#222222"
 
-#: View direction in degrees: elevation above the base's x-y plane, and azimuth about its z axis.
+#: The view has an elevation above the base's x-y plane and an azimuth about its z axis, in degrees.
 _ELEVATION, _AZIMUTH = 20.0, -55.0
 
 
 def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) -> str:
-    """Return an SVG of the table's chain.
+    """Return an SVG of the table's chain at q (rad and m, or by name); None is the zero configuration.
 
-    Args:
-        table: The table.
-        q: (coordinates,) rad and m, or a mapping by name; None is the zero configuration.
-
-    Raises:
-        InputError: matplotlib is not installed, or `q` has the wrong length.
+    Raise InputError if matplotlib is not installed, or `q` has the wrong length.
     """
     frames = table.frames(q)
     if frames.ndim != 3:
@@ -46,7 +41,7 @@ def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) ->
         axes: Any = new_figure(10.0, 9.0).add_subplot()
         tip = frames[-1] @ table.tool
         points = np.concatenate(
-            [frames[:, :3, 3], _corners(table, frames), tip[None, :3, 3], np.zeros((1, 3))]
+            [frames[:, :3, 3], row_corners(table, frames), tip[None, :3, 3], np.zeros((1, 3))]
         )
         projection = _view(math.radians(_ELEVATION), math.radians(_AZIMUTH))
         canvas = _Canvas(axes, projection, max(float(np.ptp(points, axis=0).max()), 1e-3))
@@ -72,7 +67,6 @@ class _Canvas:
     """A two-dimensional drawing of points in space; its labels are drawn last.
 
     Attributes:
-        axes: Matplotlib's axes.
         projection: (2, 3) right and up directions of the picture in the base's axes.
         size: Size of the chain, m.
         labels: (position, direction, text, colour) of each label.
@@ -84,7 +78,6 @@ class _Canvas:
     labels: list[tuple[FloatArray, FloatArray, str, str]] = field(default_factory=list)
 
     def line(self, start: FloatArray, end: FloatArray, **style: Any) -> None:
-        """Draw a straight line."""
         (x, y), (u, v) = self.projection @ start, self.projection @ end
         self.axes.plot([x, u], [y, v], solid_capstyle="round", **style)
 
@@ -101,7 +94,6 @@ class _Canvas:
         self.label(start + 1.25 * along, along, name, color)
 
     def mark(self, point: FloatArray, **style: Any) -> None:
-        """Mark a joint or the tip."""
         self.axes.plot(*(self.projection @ point)[:, None], zorder=5, **style)
 
     def label(self, point: FloatArray, along: FloatArray, text: str, color: str) -> None:
@@ -109,10 +101,9 @@ class _Canvas:
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def write_labels(self) -> None:
-        """Draw the labels.
+        """Draw the labels without overlaps.
 
-        Two labels of the same colour at the same point become one label. Other labels are moved so that they
-        do not overlap.
+        Two labels of the same colour at the same point become one label.
         """
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
         for place, along, text, color in self.labels:
@@ -132,16 +123,15 @@ class _Canvas:
                 spot = spot + step * side
             taken.append(spot)
             words = {"color": color, "ha": "center", "va": "center", "zorder": 6}
-            self.axes.text(
-                *spot, ", ".join(texts), parse_math=color in (_X, _Z), **words
-            )  # these texts are urdfkin's own, so they need no escaping
+            # These texts are urdfkin's own, so they need no escaping.
+            self.axes.text(*spot, ", ".join(texts), parse_math=color in (_X, _Z), **words)
 
 
-def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
+def row_corners(table: DHTable, frames: FloatArray) -> FloatArray:
     """Return for each row of the table the point (n, 3) between the offset d and the length a."""
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
-        # in this convention, the offset d comes first, then the length a
+        # In the standard convention, the offset d comes before the length a.
         if table.convention is Convention.STANDARD:
             x, z = frames[i + 1, :3, 0], frames[i + 1, :3, 2]
             normal = math.cos(row.beta) * x + math.sin(row.beta) * z
@@ -153,7 +143,7 @@ def _corners(table: DHTable, frames: FloatArray) -> FloatArray:
 
 def _draw(canvas: _Canvas, table: DHTable, frames: FloatArray, tip: FloatArray) -> None:
     size, standard = canvas.size, table.convention is Convention.STANDARD
-    for i, (row, corner) in enumerate(zip(table.rows, _corners(table, frames), strict=True)):
+    for i, (row, corner) in enumerate(zip(table.rows, row_corners(table, frames), strict=True)):
         first, second = (_D, _A) if standard else (_A, _D)
         canvas.line(frames[i, :3, 3], corner, color=first, linewidth=2.6)
         canvas.line(corner, frames[i + 1, :3, 3], color=second, linewidth=2.6)

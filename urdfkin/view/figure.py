@@ -10,6 +10,7 @@ import importlib.util
 import io
 import re
 from functools import cache
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     Axes = matplotlib.axes.Axes
     Figure = matplotlib.figure.Figure
 
-#: For each placeholder colour in a drawing: the colour of the page's style that replaces it.
+#: The colours of the page's style replace placeholder colours in a drawing.
 PAGE_COLOURS = {
     "#010101": "var(--plot-text)",
     "#020202": "var(--plot-grid)",
@@ -36,19 +37,19 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours, distinguishable with every colour vision deficiency. Some readers see no colours.
-#: Therefore lines with different colours also differ in line style, sign or position.
+#: Okabe and Ito's colours are distinguishable with every colour vision deficiency.
+#: Lines with different colours also differ in line style, sign or position.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: Colour of a number that is wrong or outside its limits; a cross always marks such a number as well.
+#: A number with this colour is wrong or outside its limits; a cross also marks such a number.
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "urdfkin",
     "font.family": "DejaVu Sans",
-    # Names are plain text for all settings of the user: no mathematics between dollar signs, no TeX.
+    # A name is plain text, without mathematics and TeX, for all settings of the user.
     "text.parse_math": False,
     "text.usetex": False,
     "axes.spines.top": False,
@@ -57,26 +58,18 @@ _STYLE: dict[Any, Any] = {
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure without a window and without global state.
+    """Return an empty figure (size in inches) without a window and without global state.
 
-    Args:
-        width: Width in inches.
-        height: Height in inches.
-
-    Raises:
-        InputError: matplotlib is not installed.
+    Raise InputError if matplotlib is not installed.
     """
     _matplotlib()
-    from matplotlib.figure import Figure  # noqa: PLC0415  keeps other commands fast
+    from matplotlib.figure import Figure  # noqa: PLC0415  other commands do not need this module
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def style(**more: Any) -> Any:
-    """Return a matplotlib context.
-
-    In SVG files of this context, text is stored as text, and equal drawings give equal files.
-    """
+    """Return a matplotlib context in which SVG has text as text, and equal drawings give equal files."""
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 
@@ -86,7 +79,6 @@ def label(name: str) -> str:
 
 
 def installed() -> bool:
-    """Return whether matplotlib is installed."""
     return importlib.util.find_spec("matplotlib") is not None
 
 
@@ -100,12 +92,9 @@ def _matplotlib() -> Any:
 
 
 def save(figure: Figure, path: Path) -> bytes:
-    """Return the figure as the bytes of a file.
+    """Return the figure as the bytes of a file; the same input gives the same bytes.
 
-    The suffix of `path` selects the format. The same input gives the same bytes.
-
-    Raises:
-        InputError: a suffix other than svg, png, pdf.
+    The suffix of `path` selects the format. Raise InputError for a suffix other than svg, png, pdf.
     """
     ending = path.suffix.removeprefix(".").lower()
     if ending not in FORMATS:
@@ -120,20 +109,17 @@ def save(figure: Figure, path: Path) -> bytes:
 
 
 def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str:
-    """Return the figure as an SVG element of a page.
+    """Return the figure, drawn with `PAGE_COLOURS`, as an SVG element of a page.
 
-    Args:
-        figure: A figure drawn with `PAGE_COLOURS`.
-        prefix: Prefix of the ids, so that ids are unique on a page with several figures.
-        title: Title for screen readers; plain text.
-        description: Description for screen readers; plain text.
+    The prefix makes ids unique on a page with several figures. The plain texts `title` and `description` are
+    for screen readers.
     """
     stream = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with style():
         figure.savefig(stream, format="svg", metadata=nothing, transparent=True)
     text = stream.getvalue()
-    # A style element would affect the whole page; the page sets line joins itself.
+    # A style element would affect the whole page.
     text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = _with_ids(text, prefix)
     for colour, page in PAGE_COLOURS.items():
@@ -142,7 +128,8 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
     text = re.sub(r"<!--.*?-->|\n\s*", lambda found: "\n" if found[0][0] == "\n" else "", text)
     head, _, body = text.partition(">")
     size = re.search(r'viewBox="[^"]*"', head)
-    labels = f"<title>{_escaped(title)}</title><desc>{_escaped(description)}</desc>"
+    words = (escape(printable(text), quote=False) for text in (title, description))
+    labels = "<title>{}</title><desc>{}</desc>".format(*words)
     return f'<svg class="plot" {size[0] if size else ""} role="img">{labels}{body}'
 
 
@@ -154,7 +141,3 @@ def _with_ids(text: str, prefix: str) -> str:
     )
     text = re.sub(r"url\(#", f"url(#{prefix}", text)
     return re.sub(r'xlink:href="#', f'href="#{prefix}', text)
-
-
-def _escaped(text: str) -> str:
-    return printable(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

@@ -1,8 +1,7 @@
 """Play a trajectory in the viewer, and save pictures and motions.
 
-The viewer shows samples of the trajectory and interpolates nothing, so the screen only shows numbers that
-Pinocchio has checked. A saved motion is a GIF: it plays in browsers, slides and chats without a further
-program.
+The viewer interpolates nothing, so the screen only shows numbers that Pinocchio has checked. A saved motion
+is a GIF: it plays in browsers, slides and chats without a further program.
 """
 
 from __future__ import annotations
@@ -22,36 +21,27 @@ from urdfkin.robot.trajectory import Trajectory
 from urdfkin.view.plot import foot
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-#: Largest number of updates per second while playing. For a saved motion: its frames per second, its largest
-#: number of frames, and its size in pixels.
+#: While playing, the viewer makes at most this number of updates per second.
+#: A saved motion has this frame rate (1/s), this largest number of frames, and this size in pixels.
 _RATE, _FRAME_RATE, _MOST_FRAMES, _SIZE = 20.0, 12.5, 250, (640, 480)
 
 
 class Screen(Protocol):
-    """The attributes of a viewer that a `Player` uses."""
-
     server: Any
     robot: Robot
     frame: Any
     reference: Any
 
     @property
-    def file_name(self) -> str:
-        """The name of a saved file, without its suffix."""
+    def file_name(self) -> str: ...
 
-    def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
-        """Show a configuration with its joint velocities and accelerations."""
+    def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None: ...
 
 
 class Player:
     """The controls of a trajectory: time, play and pause, speed, and the file of the motion.
 
-    Args:
-        viewer: The viewer, which shows one sample at a time.
-        trajectory: The trajectory.
-
-    Attributes:
-        sample: Index of the sample that is shown.
+    The attribute `sample` is the index of the sample that the viewer shows.
     """
 
     def __init__(self, viewer: Screen, trajectory: Trajectory) -> None:
@@ -73,7 +63,6 @@ class Player:
         save.on_click(lambda event: self._save(event.client))
 
     def check(self) -> None:
-        """Compare the chosen frame's motion with Pinocchio for all samples, and show the result."""
         viewer, x = self._viewer, self.trajectory
         motion = frame_motion(viewer.robot, x, viewer.frame.value, viewer.reference.value)
         mark = "! " if motion.not_verified is not None else "✓ " if motion.agrees else "✗ "
@@ -81,7 +70,6 @@ class Player:
         self._write()
 
     def show(self, sample: int) -> None:
-        """Show one sample: the sliders, the robot and the numbers follow."""
         self.sample, x = sample, self.trajectory
         self._setting = True
         try:
@@ -112,7 +100,6 @@ class Player:
             threading.Thread(target=self._run, daemon=True).start()
 
     def pause(self) -> None:
-        """Stop at the current sample."""
         self._playing.clear()
         self.button.label = "play"
 
@@ -130,7 +117,6 @@ class Player:
             now, last = min(float(t[-1]), now + (this - last) * float(self.speed.value)), this
 
     def _save(self, client: Any) -> None:
-        """Draw the samples one after the other in the browser, and send the GIF file to the browser."""
         if client is None:
             return
         self.pause()
@@ -144,10 +130,7 @@ class Player:
                 self.show(self._nearest(float(moment)))
                 frames.append(_new_picture(client, frames[-1] if frames else None))
                 note.body = f"{k + 1} of {count} pictures"
-        except (
-            RuntimeError,
-            TimeoutError,
-        ):  # the page was closed, or is in a background tab, where browsers draw nothing
+        except (RuntimeError, TimeoutError):  # browsers draw nothing in a background tab
             return
         finally:
             note.remove()
@@ -172,9 +155,8 @@ def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
     """Return an endless animation of frames (height, width, 3 or 4), each shown for some seconds."""
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()
-    shown = max(
-        20, 10 * round(100 * seconds)
-    )  # milliseconds; a GIF counts in hundredths of a second, and browsers slow down pictures of 1/100 s
+    # A GIF counts in hundredths of a second, and browsers slow down pictures of 1/100 s.
+    shown = max(20, 10 * round(100 * seconds))
     images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=shown, loop=0)
     return stream.getvalue()
 
@@ -187,7 +169,7 @@ def as_png(frame: np.ndarray) -> bytes:
 
 
 def _on_white(frame: np.ndarray) -> Any:
-    from PIL import Image  # noqa: PLC0415
+    from PIL import Image  # noqa: PLC0415  only a saved picture needs this module
 
     image = Image.fromarray(frame).convert("RGBA")
     return Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")

@@ -29,16 +29,15 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: A function that draws a motion over time, in seconds, into axes.
+#: A panel draws a motion over time, in seconds, into axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Line styles. The styles distinguish lines for readers who see no colours.
+#: Line styles distinguish lines without colours.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
-#: Largest number of names in a legend, because more lines are not distinguishable, and the colour of the
-#: lines without a name.
+#: A legend has at most this number of names. Lines without a name have one colour.
 _MOST_NAMES, _UNNAMED = 14, "#9AA7B5"
 
 
@@ -48,51 +47,22 @@ def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) ->
 
 
 def _look(k: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line k.
-
-    The first 49 lines have different combinations of colour and dashes.
-    """
+    """Return the colour and the dashes of line k; the first 49 lines have different combinations."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
-def position(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the frame's origin in the world, m."""
-    _lines(axes, t, x.placement[:, :3, 3], ("x", "y", "z"))
-    axes.set_ylabel("position [m]")
+def _xyz(vector: Callable[[FrameMotion], FloatArray], label: str) -> Panel:
+    def panel(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
+        _lines(axes, t, vector(x), ("x", "y", "z"))
+        axes.set_ylabel(label)
+
+    return panel
 
 
-def orientation(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the frame's rotation since the start, rad.
-
-    The orientation is drawn as the rotation vector, axis times angle, in world axes.
-    """
+def _rotation(x: FrameMotion) -> FloatArray:
+    """Return the frame's rotation since the start as a rotation vector (n, 3) in world axes, in rad."""
     R = x.placement[:, :3, :3]
-    _lines(axes, t, log_rotation(R @ R[0].T), ("x", "y", "z"))
-    axes.set_ylabel("rotation [rad]")
-
-
-def velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the linear velocity, m/s."""
-    _lines(axes, t, x.velocity[:, :3], ("x", "y", "z"))
-    axes.set_ylabel("velocity [m/s]")
-
-
-def angular_velocity(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the angular velocity, rad/s."""
-    _lines(axes, t, x.velocity[:, 3:], ("x", "y", "z"))
-    axes.set_ylabel("angular velocity\n[rad/s]")
-
-
-def acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the classical linear acceleration, m/s^2."""
-    _lines(axes, t, x.acceleration[:, :3], ("x", "y", "z"))
-    axes.set_ylabel("acceleration [m/s²]")
-
-
-def angular_acceleration(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the angular acceleration, rad/s^2."""
-    _lines(axes, t, x.acceleration[:, 3:], ("x", "y", "z"))
-    axes.set_ylabel("ang. acceleration\n[rad/s²]")
+    return log_rotation(R @ R[0].T)
 
 
 def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
@@ -145,8 +115,8 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
-    # Bounds are about a hundred times the usual disagreement, so the axis is logarithmic. Below 1, which is
-    # the size of one rounding error, the axis is linear.
+    # Bounds are about a hundred times the usual disagreement, so the axis is logarithmic.
+    # Below 1, which is the size of one rounding error, the axis is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -154,12 +124,12 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 #: All panels by name, in the order of the figure.
 PANELS: dict[str, Panel] = {
-    "position": position,
-    "orientation": orientation,
-    "velocity": velocity,
-    "angular-velocity": angular_velocity,
-    "acceleration": acceleration,
-    "angular-acceleration": angular_acceleration,
+    "position": _xyz(lambda x: x.placement[:, :3, 3], "position [m]"),
+    "orientation": _xyz(_rotation, "rotation [rad]"),
+    "velocity": _xyz(lambda x: x.velocity[:, :3], "velocity [m/s]"),
+    "angular-velocity": _xyz(lambda x: x.velocity[:, 3:], "angular velocity\n[rad/s]"),
+    "acceleration": _xyz(lambda x: x.acceleration[:, :3], "acceleration [m/s²]"),
+    "angular-acceleration": _xyz(lambda x: x.acceleration[:, 3:], "ang. acceleration\n[rad/s²]"),
     "parts": parts,
     "singular-values": partial(singular_values, rows=_LINEAR, unit="m/s"),
     "angular-singular-values": partial(singular_values, rows=_ANGULAR, unit="rad/s"),
@@ -168,17 +138,14 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: The text "rad" or "m" is followed by "/s" for joint velocities and by "/s²" for joint accelerations.
+#: The unit of q, v or a has this text after "rad" or "m".
 _PER = {"q": "", "v": "/s", "a": "/s²"}
 #: Names of the panels of coordinates. Each panel has one plot for each unit.
 COORDINATES = tuple(_PER)
 
 
 def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
-    """Return panels of q, v or a over time, with the limits of the moving joints.
-
-    There is one panel for each unit.
-    """
+    """Return a panel of q, v or a over time for each unit, with the limits of the moving joints."""
     units = np.array(configuration.units(robot.tree, what))
     return [
         partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
@@ -232,7 +199,7 @@ def _coordinates(
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
     """Return whether each sample is outside the limits by more than one unit in the last place of a double.
 
-    A smaller deviation is ignored, because it may come from the decimal notation of the limits.
+    A smaller deviation may come from the decimal notation of the limits.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -245,14 +212,14 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
     return -largest, largest
 
 
-#: Largest size of a figure in inches: a page of A4 or US Letter with a margin.
+#: A figure (inches) fits on a page of A4 or US Letter with a margin.
 _PAGE = (7.6, 10.4)
-#: Height of a panel, and of title and footer together, in inches.
+#: A panel, and the title with the footer, have these heights in inches.
 _HEIGHT, _WORDS = 2.1, 0.9
-#: Numbers for the layout of text: letters per inch in the footer and in a legend. The sample line in a legend
-#: is as wide as `_HANDLE` letters.
+#: One inch has this number of letters in the footer and in a legend.
+#: The sample line in a legend is as wide as `_HANDLE` letters.
 _LETTERS, _LETTERS_OF_LEGEND, _HANDLE = 16, 22, 8
-#: This sentence is in the footer of a figure if v and a may not be the exact derivatives of q.
+#: The footer has this sentence if v and a may not be the exact derivatives of q.
 _RATES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
 )
@@ -261,15 +228,8 @@ _RATES_UNCHECKED = (
 def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
     """Return a figure with the panels in two columns.
 
-    Args:
-        robot: The robot.
-        x: The frame's motion along the trajectory.
-        trajectory: The trajectory, with the source of v and a.
-        panels: Names from `COORDINATES` and `PANELS`; empty means all.
-
-    Raises:
-        UnknownNameError: an unknown panel.
-        InputError: matplotlib is not installed.
+    The names `panels` are from `COORDINATES` and `PANELS`; empty means all. Raise UnknownNameError for an
+    unknown panel, and InputError without matplotlib.
     """
     drawn = _panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
@@ -320,7 +280,6 @@ def _panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[
 
 
 def way(x: FrameMotion, trajectory: Trajectory) -> str:
-    """Return a line of text with the start, the end and the duration of the frame's motion."""
     ends = [
         "({})".format(", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0)) for k in (0, -1)
     ]

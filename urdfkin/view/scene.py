@@ -25,7 +25,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: Largest size of a mesh, material or texture file in bytes; larger files are not shown.
+#: A mesh, material or texture file with more bytes is not shown.
 LARGEST_FILE = 200_000_000
 
 
@@ -34,10 +34,7 @@ def _read(file: Path) -> Any:
     import trimesh  # noqa: PLC0415  the import takes half a second
 
     class SameFolder(trimesh.resolvers.FilePathResolver):
-        """Find the files of materials and textures.
-
-        Only regular files in the mesh's folder or below it are accepted.
-        """
+        """Find materials and textures: only regular files in the mesh's folder or below it."""
 
         def get(self, name: str) -> bytes:
             folder = Path(self.parent).resolve()
@@ -53,7 +50,7 @@ def _read(file: Path) -> Any:
 
 def mesh(shape: Shape) -> Any | None:
     """Return a coloured trimesh.Trimesh in the link's axes; None if the file is unreadable."""
-    import trimesh  # noqa: PLC0415
+    import trimesh  # noqa: PLC0415  the import takes half a second
 
     if shape.file is None:
         return None
@@ -72,10 +69,7 @@ def mesh(shape: Shape) -> Any | None:
 
 
 def corners(shape: Shape) -> FloatArray:
-    """Return the corners (8, 3) of a box around a shape, in the link's frame.
-
-    The file of a mesh must be readable.
-    """
+    """Return the corners (8, 3) of a box around a shape, in the link's frame; a mesh must be readable."""
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
         lower, upper = mesh(shape).bounds  # type: ignore[union-attr]
@@ -96,11 +90,9 @@ class Shape:
     """One visual of a link.
 
     Attributes:
-        link: The link's name.
         kind: "box", "cylinder", "sphere" or "mesh".
         size: Lengths in metres: (x, y, z) for a box, (radius, length) for a cylinder, (radius,) for a sphere.
             For a mesh, the scale factors (x, y, z).
-        T_link_shape: (4, 4) pose of the shape in the link's frame.
         colour: Red, green, blue and opacity, each from 0 to 1. None means the colours of the mesh file.
         file: The mesh's file; None for other kinds, and for a file that is not found.
         address: The mesh's address in the URDF; "" for other kinds.
@@ -116,15 +108,13 @@ class Shape:
 
     @property
     def missing(self) -> bool:
-        """Whether the shape is a mesh without a file."""
         return self.kind == "mesh" and self.file is None
 
 
 def shapes(robot: Robot) -> list[Shape]:
-    """Return all visuals of a robot.
+    """Return all visuals of a robot, except malformed ones.
 
-    The URDF of a loaded robot is already checked, so the plain XML parser is safe. A malformed visual is
-    skipped, because it does not affect the kinematics.
+    The URDF of a loaded robot is already checked, so the plain XML parser is safe.
     """
     root = plain_xml(robot.urdf)
     urdf_file = _file_of(robot)
@@ -139,7 +129,7 @@ def shapes(robot: Robot) -> list[Shape]:
 
 
 def _file_of(robot: Robot) -> Path | None:
-    """Return the file of a robot, or None. Meshes are searched in the folder of this file."""
+    """Return the file of a robot, in whose folder meshes are searched, or None."""
     entry = catalogue().get(robot.source)
     path = entry.path if entry is not None else Path(robot.source)
     try:
@@ -203,10 +193,7 @@ def _rgba(material: Element) -> tuple[float, float, float, float] | None:
 
 
 def mesh_file(address: str, urdf_file: Path | None) -> Path | None:
-    """Return the file of a mesh's address, or None.
-
-    The address is `package://`, `file://`, or a path relative to the URDF's folder.
-    """
+    """Return the file of a `package://` or `file://` address, or of a path relative to the URDF, or None."""
     candidates = list(_candidates(address, urdf_file))
     try:
         return next((path for path in candidates if path.is_file()), None)

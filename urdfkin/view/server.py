@@ -10,13 +10,11 @@ Four independent measures keep them out:
 | a check of the **Origin** header | another page that opens a WebSocket, which browsers allow |
 | security **headers** of the page | embedding in a frame, foreign scripts, connections to other servers |
 
-`RequestFilter` decides about requests; it does not depend on viser or a network.
-
 Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
 server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that answers
-the requests. Before a robot is shown, the module tests the running server with requests that it must refuse.
-It stops the server if the server accepts one of these requests. A new version of viser can therefore make the
-viewer fail, but it cannot make it insecure.
+the requests. Before a robot is shown, the module tests the running server with requests that it must refuse,
+and stops a server that accepts one of them. A new version of viser can therefore make the viewer fail, but it
+cannot make it insecure.
 
 The address is not passed to the browser on its command line, which every user of the machine can read.
 Instead the browser opens a file in a private folder. This file redirects the browser to the address.
@@ -46,7 +44,7 @@ from pathlib import Path
 from typing import Any
 
 from urdfkin.errors import InputError, UrdfkinError
-from urdfkin.system.lazy_import import install_remedy
+from urdfkin.system.lazy_import import install_remedy, installed_version
 from urdfkin.system.locks import lock_over_forks
 
 
@@ -58,7 +56,7 @@ def has_screen() -> bool:
 @contextmanager
 def opened_page(address: str) -> Iterator[None]:
     """Open the address in the user's browser, by a temporary file that redirects to it."""
-    with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # readable by this user only
+    with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # only this user can read the folder
         page = Path(folder) / "view.html"
         page.write_text(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">', "utf-8")
         webbrowser.open(page.as_uri())
@@ -67,7 +65,7 @@ def opened_page(address: str) -> Iterator[None]:
 
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
-#: Headers of every response: no caching, no type guessing, no embedding, no leak of the key by a referrer.
+#: The headers of every response forbid caching, type guessing, embedding, and referrers with the key.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -80,7 +78,7 @@ HEADERS = {
 
 @dataclass(frozen=True, slots=True)
 class RequestFilter:
-    """Accepts or refuses requests.
+    """Accepts or refuses requests, without viser or a network.
 
     Attributes:
         host: The address that the server listens on, as given by the user.
@@ -93,11 +91,8 @@ class RequestFilter:
     def refusal(self, path: str, hosts: list[str], origins: list[str], *, connects: bool) -> str | None:
         """Return the reason why a request is refused, or None if the request is allowed.
 
-        Args:
-            path: The requested path.
-            hosts: All Host headers.
-            origins: All Origin headers.
-            connects: Whether the request opens a WebSocket, which needs an Origin; a page request has none.
+        `hosts` and `origins` are all such headers. A request that opens a WebSocket (`connects`) needs an
+        Origin; a page request has none.
 
         Example:
             >>> requests = RequestFilter("127.0.0.1", "key")
@@ -128,25 +123,20 @@ class RequestFilter:
         try:
             address = ip_address(name)
         except ValueError:
-            return name == "localhost" or (not self.is_local and name in {self.host.lower(), _own_name()})
+            own = {self.host.lower(), socket.gethostname().lower()}
+            return name == "localhost" or (not self.is_local and name in own)
         return address.is_loopback or not self.is_local
 
     @property
     def is_local(self) -> bool:
-        """Whether only this machine can reach the server."""
         try:
             return ip_address(self.host).is_loopback
         except ValueError:
             return self.host.lower() == "localhost"
 
     def address(self, port: int) -> str:
-        """Return the address to open in a browser on this machine."""
         name = "127.0.0.1" if self.host in ("", "0.0.0.0", "::") else self.host
         return f"http://{f'[{name}]' if ':' in name else name}:{port}/{self.key}/"
-
-
-def _own_name() -> str:
-    return socket.gethostname().lower()
 
 
 def policy(nonce: str, host: str) -> str:
@@ -174,16 +164,15 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only type of message that the server itself accepts from a page. The message reports that a control has
-#: changed. Messages about the camera are handled by each connection.
+#: The only message that the server itself accepts from a page reports that a control has changed.
+#: Each connection handles the messages about its camera.
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Replacements in the text of viser's page. These replacements add the nonce to the first script, and to the
-#: script that the first script creates.
+#: The first script of viser's page, and the script that it creates, get the nonce by these replacements.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
-#: The start of the page's head, where this package's own script is added.
+#: urdfkin's script is added after this start of the page's head.
 _HEAD = '<meta charset="utf-8" />'
 _swapping = lock_over_forks()
 
@@ -194,7 +183,7 @@ class UnguardedError(UrdfkinError, RuntimeError):
     def __init__(self, what: str) -> None:
         super().__init__(
             f"the viewer cannot be secured: {what}",
-            where=f"viser {_version()}",
+            where=f"viser {installed_version('viser')}",
             remedy="pip install 'viser==1.1.1', which is secure, and report this error to urdfkin",
         )
 
@@ -202,18 +191,15 @@ class UnguardedError(UrdfkinError, RuntimeError):
 def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
     """Start viser's server with the request filter; `server.address` is the address to open.
 
-    Raises:
-        InputError: viser is not installed, or `host` is not an address of this machine.
-        UnguardedError: this version of viser cannot be secured.
+    Raise InputError if viser is not installed, or `host` is not an address of this machine, and
+    UnguardedError if this version of viser cannot be secured.
     """
     try:
-        import viser  # noqa: PLC0415  an extra
+        import viser  # noqa: PLC0415  only the viewer needs this optional package
     except ImportError:
         raise InputError("the viewer needs viser", remedy=install_remedy("view")) from None
 
     class PrivateServer(viser.ViserServer):
-        """Viser's server without sharing."""
-
         address: str
 
         def request_share_url(self, verbose: bool = True) -> str | None:
@@ -223,7 +209,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
     _require_address(host)
     requests = RequestFilter(host, secrets.token_urlsafe(16))
-    # Viser prints its address without the key, so the printed line would be useless.
+    # Viser prints its address without the key.
     with _responding_with(_answer(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
         server = PrivateServer(host=host, port=port, label="urdfkin", verbose=False)
     try:
@@ -256,8 +242,8 @@ def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[
 
     The callback returns a response, or None to accept a WebSocket connection.
     """
-    from websockets.datastructures import Headers  # noqa: PLC0415  with viser
-    from websockets.http11 import Response  # noqa: PLC0415
+    from websockets.datastructures import Headers  # noqa: PLC0415  only the viewer needs this module
+    from websockets.http11 import Response  # noqa: PLC0415  only the viewer needs this module
 
     def response(status: http.HTTPStatus, kind: str, body: bytes, **more: str) -> Response:
         length = {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(body))}
@@ -280,7 +266,7 @@ def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[
 
 def _page() -> Callable[[str], bytes]:
     """Return a function that creates viser's page for a nonce, which is a random key of the page."""
-    import viser  # noqa: PLC0415  an extra
+    import viser  # noqa: PLC0415  only the viewer needs this optional package
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
     try:
@@ -291,8 +277,7 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD) != 1:
         raise UnguardedError("the page of viser has no <head> element")
-    # urdfkin's script is inserted before viser's script, and therefore runs first. It names the controls and
-    # follows the browser's theme.
+    # urdfkin's script runs before viser's script. It names the controls and follows the browser's theme.
     ours = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:
@@ -306,11 +291,8 @@ def _page() -> Callable[[str], bytes]:
 
 @contextlib.contextmanager
 def _responding_with(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """While the context is open, new servers call `answer` for each request.
-
-    They do not log refused requests.
-    """
-    from websockets.asyncio import server as module  # noqa: PLC0415  with viser
+    """While the context is open, new servers call `answer` for each request, and log no refused request."""
+    from websockets.asyncio import server as module  # noqa: PLC0415  only the viewer needs this module
 
     plain: Any = module.serve
     logger = logging.Logger("urdfkin.view")
@@ -324,7 +306,7 @@ def _responding_with(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
         try:
             yield
         finally:
-            setattr(module, "serve", plain)  # noqa: B010
+            setattr(module, "serve", plain)  # noqa: B010  mypy rejects a plain assignment
 
 
 # -- checks of the server -----------------------------------------------------------------------------
@@ -345,10 +327,9 @@ def _silence(server: Any) -> None:
 
 
 def _test_the_filter(requests: RequestFilter, port: int) -> None:
-    """Test the running server: it must return its own page and refuse four kinds of foreign requests.
+    """Test the running server, or raise UnguardedError.
 
-    Raises:
-        UnguardedError: a response was not as expected.
+    The server must return its own page and refuse four kinds of foreign requests.
     """
     host = requests.address(port).split("/")[2]
     socket_ = {
@@ -358,17 +339,13 @@ def _test_the_filter(requests: RequestFilter, port: int) -> None:
         "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
     }
     here, there = {"Host": host}, {"Host": "rebound.invalid"}
+    foreign, keyless = (here | socket_ | {"Origin": x} for x in ("http://x.invalid", f"http://{host}"))
     cases: tuple[tuple[str, str, dict[str, str], int], ...] = (
         ("its own page", f"/{requests.key}/", here, 200),
         ("a page without the key", "/", here, 403),
         ("a page under another name", f"/{requests.key}/", there, 403),
-        (
-            "another page's connection",
-            f"/{requests.key}",
-            here | socket_ | {"Origin": "http://x.invalid"},
-            403,
-        ),
-        ("a connection without the key", "/", here | socket_ | {"Origin": f"http://{host}"}, 403),
+        ("another page's connection", f"/{requests.key}", foreign, 403),
+        ("a connection without the key", "/", keyless, 403),
     )
     for what, path, headers, expected in cases:
         connection = http.client.HTTPConnection(host, timeout=30)
@@ -382,9 +359,3 @@ def _test_the_filter(requests: RequestFilter, port: int) -> None:
             raise UnguardedError(f"{what} was not answered: {error}") from error
         finally:
             connection.close()
-
-
-def _version() -> str:
-    from importlib import metadata  # noqa: PLC0415  for an error only
-
-    return metadata.version("viser")

@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.breakdown import KINDS
-from urdfkin.dh.table import DHTable
+from urdfkin.dh.table import Convention, DHTable
 from urdfkin.errors.escape import printable
 from urdfkin.kinematics.rotation import quaternion_of
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion
+from urdfkin.view.dh_drawing import row_corners
 from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
-#: The colour of each part of the acceleration and of their sum, as red, green and blue from 0 to 255.
+#: Each part of the acceleration has a colour: red, green and blue from 0 to 255.
 PART_COLOURS = {
     "transverse": (0, 114, 178),
     "centripetal": (213, 94, 0),
@@ -32,19 +33,13 @@ PART_COLOURS = {
     "sum": (30, 30, 30),
 }
 LINEAR, ANGULAR = (0, 114, 178), (204, 121, 167)
-#: Length of the longest arrow as a fraction of the robot's reach.
+#: The longest arrow has this fraction of the robot's reach.
 _SHARE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Arrows:
-    """Arrows in the world.
-
-    Attributes:
-        points: (n, 2, 3) start and end of each arrow, metres.
-        colours: (n, 3) red, green, blue, 0 to 255.
-        names: (n,) name of each arrow.
-    """
+    """Arrows in the world: points (n, 2, 3) in metres, and colours (n, 3) from 0 to 255."""
 
     points: FloatArray
     colours: np.ndarray
@@ -53,13 +48,7 @@ class Arrows:
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """An ellipsoid in the world.
-
-    Attributes:
-        half: (3,) half-lengths in metres, as drawn.
-        centre: (3,) metres.
-        wxyz: (4,) orientation, scalar first.
-    """
+    """An ellipsoid in the world: half-lengths and centre (3,) in metres, and a quaternion wxyz."""
 
     half: FloatArray
     centre: FloatArray
@@ -69,13 +58,8 @@ class Ellipsoid:
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
     """Return arrows for the columns of the Jacobian, in world axes, starting at the frame's origin.
 
-    Each column is the frame's velocity when one joint moves with unit velocity.
-
-    Args:
-        x: A motion of one sample in LOCAL_WORLD_ALIGNED.
-        rates: The name of each column.
-        reach: The robot's size in metres; it scales the arrows.
-        angular: Whether to draw angular instead of linear velocities.
+    Each column is the frame's velocity when one joint moves with unit velocity. The motion x has one sample
+    in LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the arrows.
     """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
@@ -110,12 +94,8 @@ def _arrows(
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
     """Return the ellipsoid of the frame's velocities for joint velocities of length one.
 
-    A direction without motion is drawn with the smallest visible thickness.
-
-    Args:
-        x: A motion of one sample in LOCAL_WORLD_ALIGNED.
-        reach: The robot's size in metres; it scales the ellipsoid.
-        angular: Whether to use the angular instead of the linear velocity.
+    A direction without motion is drawn with the smallest visible thickness. The motion x has one sample in
+    LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the ellipsoid.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -132,20 +112,17 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Maximum time (s) between the opening of a page and its final layout.
+#: A page has its final layout at most this time (s) after its opening.
 _OPENING = 15.0
-#: `_FROM` is the direction from the robot to the camera. The robot fills the fraction `_FILLED` of the view.
-#: `_FOV` is viser's vertical field of view in rad.
+#: `_FROM` is the direction from the robot to the camera. The robot fills this fraction of the view.
+#: `_FOV` is viser's vertical field of view (rad).
 _FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
 
 
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
     """Return the position of the camera and the point it looks at, so that points (n, 3) fill the view.
 
-    Args:
-        points: Points of the robot in the world, metres.
-        aspect: Width of the view divided by its height.
-        fov: Vertical field of view, rad.
+    The points are in metres, the vertical field of view is in rad, and the aspect is width divided by height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     back = _FROM / np.linalg.norm(_FROM)
@@ -158,7 +135,7 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
 
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
-#: `SHAPES` are the display modes of the shapes. `NAMES` are the names that can be shown beside frames.
+#: The display modes of the shapes.
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
@@ -168,9 +145,7 @@ _NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
-    """A robot in viser's scene.
-
-    Each link has a frame with its shapes, or with a line to its parent if shapes are missing.
+    """A robot in viser's scene, with a frame for each link, and its shapes or a line to its parent.
 
     Attributes:
         missing: Meshes that cannot be shown.
@@ -219,10 +194,7 @@ class Stage:
         initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes.
-
-        Return True if any shape is missing, or if there are none; the viewer then shows the skeleton.
-        """
+        """Add the shapes; return whether any is missing or there are none: then the skeleton is shown."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
@@ -274,7 +246,6 @@ class Stage:
                 )
 
     def _add_names(self, kind: str, tree: KinematicTree) -> list[Any]:
-        """Add labels of the links or the moving joints at their frames."""
         of_joints = [joint.name if joint.kind.nv else "" for joint in tree.joints]
         words = tree.links if kind == "links" else ("", *of_joints)
         return [
@@ -290,7 +261,6 @@ class Stage:
         ]
 
     def _add_transparent(self) -> list[Any]:
-        """Add transparent copies of the shapes; this happens at their first use."""
         copies = []
         for shape, solid in self._shapes:
             name = f"{solid.name}-transparent"
@@ -302,15 +272,11 @@ class Stage:
         return copies
 
     def look(self) -> None:
-        """Reset the camera of every client."""
         for client in self._server.get_clients().values():
             self._look(client)
 
     def _welcome(self, client: Any) -> None:
-        """Set the camera of a new client.
-
-        The camera is set again when the panel of the page has reduced the width of the view.
-        """
+        """Set the camera of a new client, and again when the panel has reduced the width of the view."""
         begin, aspects = time.monotonic(), [0.0]
 
         def fit(_: Any) -> None:
@@ -323,7 +289,6 @@ class Stage:
         fit(None)
 
     def _look(self, client: Any) -> None:
-        """Set the camera of a client so that the robot fills its view."""
         position, middle = camera(self._filling, aspect=client.camera.aspect, fov=client.camera.fov)
         with client.atomic():
             client.camera.up_direction = (0.0, 0.0, 1.0)
@@ -370,7 +335,6 @@ class Stage:
         )
 
     def ellipsoid(self, shape: Ellipsoid | None) -> None:
-        """Draw the velocity ellipsoid; None removes it."""
         self._scene.add_icosphere(
             "/ellipsoid",
             radius=1.0,
@@ -383,20 +347,16 @@ class Stage:
         )
 
     def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
-        """Draw the frames, offsets d and lengths a of a Denavit-Hartenberg table at its coordinates q.
-
-        None removes them.
-        """
+        """Draw the frames, offsets d and lengths a of a table at its coordinates q; None removes them."""
         for handle in self._dh:
             handle.remove()
         self._dh = []
         if table is None:
             return
         frames = T_world_base @ table.frames(q)
-        starts, corners, ends = _segments(table, q, frames)
-        parts = ((starts, corners, _OFFSET), (corners, ends, _NORMAL))
-        if str(table.convention) == "modified":
-            parts = ((starts, corners, _NORMAL), (corners, ends, _OFFSET))
+        starts, middles, ends = frames[:-1, :3, 3], row_corners(table, frames), frames[1:, :3, 3]
+        standard = table.convention is Convention.STANDARD
+        first, second = (_OFFSET, _NORMAL) if standard else (_NORMAL, _OFFSET)
         self._dh.append(
             self._scene.add_batched_axes(
                 "/dh/frames",
@@ -406,32 +366,14 @@ class Stage:
                 axes_radius=0.0035 * self.reach,
             )
         )
-        for k, (start, end, colour) in enumerate(parts):
+        for k, (start, end, colour) in enumerate(((starts, middles, first), (middles, ends, second))):
             if len(start):
+                points, thickness = np.stack([start, end], axis=1), 0.006 * self.reach
                 self._dh.append(
                     self._scene.add_line_segments(
-                        f"/dh/lines{k}",
-                        points=np.stack([start, end], axis=1),
-                        colors=colour,
-                        thickness=0.006 * self.reach,
+                        f"/dh/lines{k}", points=points, colors=colour, thickness=thickness
                     )
                 )
-
-
-def _segments(table: DHTable, q: FloatArray, frames: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the points between which a Denavit-Hartenberg table is drawn, as three arrays (rows, 3).
-
-    Each row of the table is drawn as two straight lines, which have the lengths d and a. The arrays contain
-    the starts of the first lines, the common points of both lines, and the ends of the second lines.
-    """
-    starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
-    if str(table.convention) == "standard":
-        # In the standard convention, d comes first and lies on the previous z axis. The length a comes next
-        # and lies on the new x axis.
-        a = np.array([row.a for row in table.rows]).reshape(-1, 1)
-        return starts, ends - a * frames[1:, :3, 0], ends
-    a = np.array([row.a for row in table.rows]).reshape(-1, 1)
-    return starts, starts + a * frames[:-1, :3, 0], ends
 
 
 def _towards(axis: FloatArray) -> FloatArray:

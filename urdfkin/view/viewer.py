@@ -1,7 +1,6 @@
 """The viewer: a panel with sliders and checked numbers beside the robot's picture.
 
-When the user moves a slider, it reports only its own number. If the program sets a value, the slider shows
-this value but reports no change.
+A slider that the user moves reports only its own number. A slider that the program sets reports no change.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import re
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -43,14 +43,13 @@ from urdfkin.view.stage import (
 
 #: A joint with a larger range than this counts as unlimited, like a wheel.
 _FAR = 100.0
-#: A slider or an arrow key changes an angle by `_DEGREES` if the viewer shows degrees, and by `_RADIANS` if
-#: it shows radians. For a number that is not an angle, the change is the slider's range divided by `_STEPS`,
-#: rounded down to 1, 2 or 5 times a power of ten.
+#: An arrow key changes an angle by this number of degrees or radians.
+#: Other sliders have at least `_STEPS` steps of 1, 2 or 5 times a power of ten.
 _DEGREES, _RADIANS, _STEPS = 1.0, 0.01, 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Default ranges: joint velocity in rad/s or m/s, and joint acceleration in rad/s^2 or m/s^2.
+#: By default, joint velocities (rad/s, m/s) and accelerations (rad/s^2, m/s^2) have these ranges.
 _RATE, _SECOND_RATE = 3.0, 5.0
-#: Largest number of missing meshes that a message names.
+#: A message names at most this number of missing meshes.
 _MOST_MISSING = 5
 
 
@@ -60,9 +59,7 @@ class Row:
 
     Attributes:
         at: Index in the vector.
-        name: Name of the number.
         turns: Whether the number is an angle or a derivative of an angle.
-        lower, upper: Range of the slider.
     """
 
     at: int
@@ -75,13 +72,8 @@ class Row:
 class Sliders:
     """A group of sliders in the viewer's panel, for example for all joint velocities.
 
-    Args:
-        gui: Viser's GUI.
-        folder: The folder of the sliders.
-        rows: The numbers to show.
-        rate: Text after the unit: "" for q, "/s" for v, "/s²" for a.
-        moved: Function that is called when the user moves a slider; its arguments are the index and the new
-            number.
+    The unit of a slider ends with `rate`: "" for q, "/s" for v, "/s²" for a. When the user moves a slider,
+    `moved` is called with the index and the new number.
     """
 
     def __init__(
@@ -92,7 +84,6 @@ class Sliders:
         self.handles: list[Any] = []
 
     def build(self, values: FloatArray, *, degrees: bool) -> None:
-        """Create sliders in the given unit; they replace the previous sliders."""
         orders = [handle.order for handle in self.handles] or [None] * len(self.rows)
         for handle in self.handles:
             handle.remove()
@@ -137,7 +128,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # A slider that the user has just moved keeps its exact value.
+                # A slider that the user moves keeps its exact value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -159,16 +150,12 @@ class Sliders:
 
 
 def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, str]]:
-    """Return the limits as marks at the two ends of a slider."""
     first, last = (f"{round(x, 1):g}" if abs(x) >= 1.0 else f"{x:.2g}" for x in (lower, upper))
     return (lower, first), (upper, last)
 
 
 def coordinate_rows(robot: Robot) -> list[Row]:
-    """Describe a slider for each coordinate that can change; the slider's range is the joint's limits.
-
-    Quaternions have no sliders.
-    """
+    """Describe a slider within the joint's limits for each coordinate that can change, but no quaternion."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
@@ -180,7 +167,6 @@ def coordinate_rows(robot: Robot) -> list[Row]:
 
 
 def fixed_coordinates(robot: Robot) -> list[str]:
-    """Return the names of the coordinates whose limits are equal: they have no slider."""
     lower, upper = robot.limits
     return [robot.coordinate_names[i] for i in np.flatnonzero(lower == upper)]
 
@@ -225,7 +211,6 @@ def written(values: FloatArray) -> str:
 
 
 def numbers(x: FrameMotion) -> str:
-    """Return position, velocity, acceleration, singular values and check of one sample, as Markdown."""
     rows = [
         ("position", "m", x.placement[0, :3, 3]),
         ("velocity", "m/s", x.velocity[0, :3]),
@@ -253,7 +238,6 @@ def numbers(x: FrameMotion) -> str:
 
 
 def check_line(x: FrameMotion) -> str:
-    """Return a line with the result of Pinocchio's check."""
     if x.not_verified is not None:
         return f"**! not verified** by Pinocchio {version()}: {markdown_text(x.not_verified)}"
     figures = ", ".join(f"{quantity} {check.units[0]:.2g}" for quantity, check in x.checks.items())
@@ -262,7 +246,6 @@ def check_line(x: FrameMotion) -> str:
 
 
 def missing_words(missing: Iterable[Shape]) -> str:
-    """Return the names of the meshes that cannot be shown, and the remedy."""
     names = list(dict.fromkeys(shape.address or shape.link for shape in missing))
     shown = "".join(f"\n- {markdown_text(name)}" for name in names[:_MOST_MISSING])
     more = f"\n- and {len(names) - _MOST_MISSING} more" if len(names) > _MOST_MISSING else ""
@@ -277,7 +260,6 @@ def missing_words(missing: Iterable[Shape]) -> str:
 
 
 def legend() -> str:
-    """Return the legend of the acceleration's parts, with their colours."""
     return " ".join(
         f'<span style="color: rgb{colour}">■</span> {name}' for name, colour in PART_COLOURS.items()
     )
@@ -304,8 +286,6 @@ class Viewer:
 
     Attributes:
         q: (nq,) configuration of the sliders, rad and m.
-        v: (nv,) joint velocities.
-        a: (nv,) joint accelerations.
         motion: The motion of the chosen frame in the chosen reference frame, with its check.
         player: The controls of the trajectory; None without one.
     """
@@ -358,7 +338,7 @@ class Viewer:
     def _build(self, trajectory: Trajectory | None) -> None:
         gui, robot = self.server.gui, self.robot
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
-        gui.main_panel.dock_right()  # show the controls beside the picture, not over it
+        gui.main_panel.dock_right()  # the controls are beside the picture, not over it
         gui.set_panel_label(printable(robot.name))
         if self.stage.missing:
             gui.add_markdown(missing_words(self.stage.missing))
@@ -373,7 +353,7 @@ class Viewer:
         joints = gui.add_folder("Joints")
         with joints:
             self.units = gui.add_dropdown("angles", ("degrees", "radians"))
-        self.sliders = Sliders(gui, joints, coordinate_rows(robot), "", self._move)
+        self.sliders = Sliders(gui, joints, coordinate_rows(robot), "", partial(self._move, "q"))
         self.sliders.build(self.q, degrees=True)
         with joints:
             if fixed := fixed_coordinates(robot):
@@ -418,8 +398,10 @@ class Viewer:
             rest, random = gui.add_button("at rest"), gui.add_button("random")
             first = gui.add_folder("v, joint velocities", expand_by_default=True)
             second = gui.add_folder("a, joint accelerations", expand_by_default=False)
-        self.rates = Sliders(gui, first, rate_rows(robot, second=False), "/s", self._rate)
-        self.second_rates = Sliders(gui, second, rate_rows(robot, second=True), "/s²", self._second_rate)
+        self.rates = Sliders(gui, first, rate_rows(robot, second=False), "/s", partial(self._move, "v"))
+        self.second_rates = Sliders(
+            gui, second, rate_rows(robot, second=True), "/s²", partial(self._move, "a")
+        )
         for sliders, values in ((self.rates, self.v), (self.second_rates, self.a)):
             sliders.build(values, degrees=True)
         rest.on_click(lambda _: self.set_rates(np.zeros(robot.nv), np.zeros(robot.nv)))
@@ -429,31 +411,17 @@ class Viewer:
         tip = self.robot.tip_frame
         return tip if tip in self.robot.frame_names else self.robot.frame_names[-1]
 
-    def _move(self, at: int, value: float) -> None:
+    def _move(self, letter: str, at: int, value: float) -> None:
         with self._lock:
-            self.q = self.q.copy()
-            self.q[at] = value
-            self._write_q()
-            self.update()
-
-    def _rate(self, at: int, value: float) -> None:
-        with self._lock:
-            self.v = self.v.copy()
-            self.v[at] = value
-            self.update()
-
-    def _second_rate(self, at: int, value: float) -> None:
-        with self._lock:
-            self.a = self.a.copy()
-            self.a[at] = value
+            vector = getattr(self, letter).copy()
+            vector[at] = value
+            setattr(self, letter, vector)
+            if letter == "q":
+                self._write_q()
             self.update()
 
     def set_q(self, q: Given) -> None:
-        """Move the robot and all sliders to a configuration.
-
-        Raises:
-            InputError: `q` is not a valid configuration of the robot.
-        """
+        """Move the robot and all sliders to a configuration, or raise InputError."""
         with self._lock:
             self.q = checked(self.robot.tree, q, "q").copy()
             self.sliders.show(self.q)
@@ -461,7 +429,6 @@ class Viewer:
             self.update()
 
     def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
-        """Set the configuration, the joint velocities and the joint accelerations in one step."""
         with self._lock:
             self.q, self.v, self.a = q.copy(), v.copy(), a.copy()
             for sliders, values in ((self.sliders, q), (self.rates, v), (self.second_rates, a)):
@@ -470,14 +437,12 @@ class Viewer:
             self.update()
 
     def _save(self, client: Any) -> None:
-        """Send a client a picture of its view, in the size of its window."""
         if client is not None:
             height, width = client.camera.image_height, client.camera.image_width
             picture = as_png(client.get_render(height=height, width=width, timeout=60.0))
             client.send_file_download(f"{self.file_name}.png", picture, save_immediately=True)
 
     def set_rates(self, v: FloatArray, a: FloatArray) -> None:
-        """Set the joint velocities and accelerations, and their sliders."""
         with self._lock:
             self.v, self.a = v, a
             self.rates.show(v)
@@ -531,7 +496,7 @@ class Viewer:
                 try:
                     self._table = self.robot.dh(self.frame.value, convention=self.dh.value)
                     table = self._table
-                    # Escape names: code formatting is unsafe, because viser reads images even inside code.
+                    # Code formatting would be unsafe: viser reads images even inside code.
                     self.dh_words.content = markdown_text(f"{table.base_frame} to {table.tip_frame}")
                 except UrdfkinError as error:
                     self.dh_words.content = markdown_text(str(error))
@@ -542,7 +507,6 @@ class Viewer:
     # -- drawing -------------------------------------------------------------------------------------
 
     def update(self) -> None:
-        """Compute, check and draw everything."""
         with self._lock:
             self.motion = self._motion(Reference.of(self.reference.value))
             aligned = Reference.LOCAL_WORLD_ALIGNED

@@ -8,14 +8,10 @@ urdfkin accepts a fix if three conditions hold:
   them. There are two exceptions. Rounding may change the direction of a joint axis. The rotation of a joint
   origin may change by at most `Fix.turns` (rad).
 
-
-Write the changes of `--fix` as a patch for `git apply` that is safe to print.
-
-A patch contains whole lines of the file. A line can contain text that controls a terminal or a CI service,
-for example an escape sequence or a GitHub workflow command. If urdfkin escaped this text, the line would
-change, and `git apply` would refuse the patch. If a file contains text of this kind, urdfkin therefore writes
-git's binary patch, which has only ASCII characters. Above the binary patch, urdfkin writes the readable patch
-as a comment.
+A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
+a CI service, for example an escape sequence or a GitHub workflow command. `git apply` would refuse a patch
+with escaped text. urdfkin therefore writes such a patch as git's binary patch in ASCII, below the readable
+patch as a comment.
 """
 
 from __future__ import annotations
@@ -36,24 +32,17 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Largest number of passes over a file. One pass applies the fixes of one code. If two fixes overlap, the
-#: second fix needs another pass.
+#: `--fix` makes at most this number of passes over a file. One pass applies the fixes of one code.
+#: If two fixes overlap, the second fix needs another pass.
 PASSES = 100
 
-#: Bound (rad) on the rotation of a unit vector when each of its three numbers is rounded to a double.
-#: The bound is twice 2**-53.
+#: Rounding the numbers of a unit vector to doubles rotates it by at most twice 2**-53 rad.
 TILT = Fraction(1, 2**52)
 
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """The result of `mend`.
-
-    Attributes:
-        text: The fixed file.
-        fixed: The fixed findings.
-        kept: For each code whose fixes were not applied: the reason.
-    """
+    """A fixed file, the fixed findings, and the reason for each code whose fixes were not applied."""
 
     text: Text
     fixed: tuple[Finding, ...]
@@ -65,11 +54,8 @@ def mend(
 ) -> Mended:
     """Apply the automatic fixes of a file, one code after another. A file with errors is not changed.
 
-    Args:
-        text: The file.
-        look: A function that checks a text and returns all findings.
-        choose: A function that returns a filter, which selects the findings to fix. `mend` requests a new
-            filter for each pass over the file.
+    `look` checks a text and returns all findings. `choose` returns a filter that selects the findings to fix,
+    once for each pass over the file.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -97,11 +83,9 @@ def mend(
 
 
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
-    """Yield the reasons why a fix must not be applied."""
     code = fixable[0].code
-    # urdfkin stores only a limited number of findings with one code. If a file has more, a fix of one finding
-    # lets urdfkin store another one, which would look like a new finding. Therefore the comparison skips
-    # these codes.
+    # The reporter stores a limited number of findings with one code.
+    # After a fix, the reporter can store another of these findings, which would look new.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -124,10 +108,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
     """Yield differences between two robots. Ignore unused values, such as the axis of a fixed joint.
 
-    Args:
-        a: The first robot.
-        b: The second robot.
-        turns: For each joint: the bound on the rotation (rad) of the joint's frame.
+    `turns` is the bound on the rotation (rad) of each joint's frame.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
@@ -153,8 +134,7 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor on the bound `Fix.turns`. This bound is a sum of doubles, and the factor allows for the rounding
-#: errors of the sum.
+#: This factor allows for the rounding errors of `Fix.turns`, which is a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
@@ -169,10 +149,7 @@ def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) ->
 
 
 def _limits(joint: JointRecord) -> tuple[float | None, ...]:
-    """Return the limits of a joint that have an effect for its joint type.
-
-    For example, a continuous joint has no position limits.
-    """
+    """Return the limits that have an effect. For example, a continuous joint has no position limits."""
     if joint.limit is None:
         return ()
     bounded = ("lower", "upper") if joint.kind in ("revolute", "prismatic") else ()
@@ -192,11 +169,8 @@ _NO_END = "\\ No newline at end of file\n"
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
     """Return the patch of one file, safe to print; "" if the file does not change.
 
-    Args:
-        file: The name of the file, relative to the current folder.
-        before: The bytes of the file, in UTF-8 (`--fix` changes no other file).
-        after: The new bytes.
-        shown: A function that escapes, in one line, text that controls a terminal or a log.
+    The name `file` is relative to the current folder. The bytes are UTF-8, because `--fix` changes no other
+    file. `shown` escapes, in one line, text that controls a terminal or a log.
     """
     if before == after:
         return ""

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from urdfkin.urdf.findings import Finding, Fix, Rule, Severity
+from urdfkin.urdf.findings import Finding, Fix, Rule, Severity, severity_counts, totals
 from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, find_rule, page
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -24,13 +24,8 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
     """Return one SARIF run with every code as a rule and every finding as a result.
 
-    The run contains a rule about MJCF or USD files only if a finding has the code of this rule.
-
-    Args:
-        findings: The reported findings.
-        version: The version of urdfkin.
-        silenced: Pairs of a finding that a comment silences, and the reason in this comment. In SARIF, these
-            findings are marked as "suppressed in source".
+    The run contains a rule about MJCF or USD files only if a finding has its code. Each silenced finding has
+    the reason of its comment, and is marked as "suppressed in source".
     """
     codes = {finding.code for finding in findings}
     rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
@@ -110,9 +105,7 @@ def _region(finding: Finding) -> dict[str, int]:
 
 
 def _uri(file: str) -> str:
-    """Return a file name as a URI reference; `stdin` for standard input.
-
-    A relative file name becomes a relative reference.
+    """Return a file name as a URI reference, relative for a relative name; `stdin` for standard input.
 
     Bytes that a URI does not allow are written as %XX.
     """
@@ -131,10 +124,7 @@ def summary(findings: Sequence[Finding], files: int) -> str:
     >>> summary([], 1)
     'no findings in 1 file'
     """
-    where = f"{files} file" + ("" if files == 1 else "s")
-    counts = {severity: sum(f.count for f in findings if f.severity is severity) for severity in Severity}
-    parts = [f"{count} {s.value}{'' if count == 1 else 's'}" for s, count in counts.items() if count]
-    return f"{', '.join(parts)} in {where}" if parts else f"no findings in {where}"
+    return f"{totals(findings)} in {files} file" + ("" if files == 1 else "s")
 
 
 def statistics(findings: Sequence[Finding]) -> Iterator[str]:
@@ -162,18 +152,16 @@ def as_json(
 ) -> str:
     """Return the findings as one JSON document.
 
-    `{"schema": "urdfkin-findings", "version": 1, "urdfkin": "...", "files": [...], "findings": [...],
-    "silenced": [...]}`. An entry of "findings" has the fields of `Finding`, and the field `title` with the
-    title of the finding's code. An entry of "silenced" has one more field, `reason`: the reason in the
-    comment that silences the finding. The positions in a `fix` are byte indices. The byte after a byte order
-    mark has the index 0.
+    An entry of "findings" has the fields of `Finding`, and the `title` of its code. An entry of "silenced"
+    also has the `reason` in the comment that silences the finding. The positions in a `fix` are byte indices.
+    The byte after a byte order mark has the index 0.
     """
     document = {
         "schema": "urdfkin-findings",
         "version": JSON_VERSION,
         "urdfkin": version,
         "files": list(files),
-        "counts": {s.value: sum(f.count for f in findings if f.severity is s) for s in Severity},
+        "counts": severity_counts(findings),
         "findings": [_entry(finding) for finding in findings],
         "silenced": [_entry(finding) | {"reason": reason} for finding, reason in silenced],
     }

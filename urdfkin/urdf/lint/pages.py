@@ -1,11 +1,10 @@
 """Find a rule by its code, and return the documentation of each rule as data and as text.
 
-Each module that defines rules is a topic. These modules are the parser and the modules in `lint.rules`. A
-TOML file in the same folder, with the same name as the module, contains the documentation of the topic's
-rules. The file is read on demand. The documentation of one rule is called a page. If the top of the file
-defines `cure`, `others` or `question`, the pages without this entry use it. The table `parts` defines texts
-that replace `{name}` in examples. Such a text is a string, or a pair [text, times] for a repeated text, in
-which `{i}` is the index of the repetition. Line breaks in prose have no meaning.
+The parser and each module in `lint.rules` is a topic: a TOML file with the name of the module, beside it,
+documents its rules. The documentation of one rule is called a page. If the top of the file defines `cure`,
+`others` or `question`, the pages without this entry use it. The table `parts` defines texts that replace
+`{name}` in examples. Such a text is a string, or a pair [text, times] for a repeated text, in which `{i}` is
+the index of the repetition. Line breaks in prose have no meaning.
 """
 
 from __future__ import annotations
@@ -27,19 +26,18 @@ if TYPE_CHECKING:
 
 _MODULES = (parser, dialect, joints, bodies)
 
-#: For each topic: its rules.
+#: The rules of each topic.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in _MODULES
 }
 
-#: The rules about URDF files. The key is the code; codes are in ascending order.
+#: The rules about URDF files by code, in ascending order.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: The rules about MJCF and USD files. The key is the code.
+#: The rules about MJCF and USD files by code.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: For each name of a rule, in lower case: the code of the rule. Each rule has three names: its code, the
-#: digits of its code, and its short name.
+#: The names of a rule are its code, the digits of the code, and its short name, in lower case.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
@@ -70,13 +68,11 @@ class Page:
 
 
 def page(code: str) -> Page:
-    """Return the page of a code."""
     return topic_pages(_TOPIC[code])[code]
 
 
 def page_files() -> dict[str, Traversable]:
-    """Return the file with the pages of each topic."""
-    from importlib import resources  # noqa: PLC0415  few runs need a page
+    from importlib import resources  # noqa: PLC0415  few runs need this module
 
     packages = {module.__name__.rpartition(".")[2]: module.__package__ for module in (*_MODULES, left_out)}
     return {topic: resources.files(str(package)) / f"{topic}.toml" for topic, package in packages.items()}
@@ -84,8 +80,7 @@ def page_files() -> dict[str, Traversable]:
 
 @cache
 def topic_pages(topic: str) -> dict[str, Page]:
-    """Return the pages of a topic."""
-    import tomllib  # noqa: PLC0415
+    import tomllib  # noqa: PLC0415  few runs need this module
 
     data = tomllib.loads(page_files()[topic].read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}
@@ -111,11 +106,7 @@ def _expand_parts(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    """Return a rule by its code or short name, in upper or lower case.
-
-    Raises:
-        UnknownNameError: there is no such rule. The message lists the nearest names.
-    """
+    """Return a rule by its code or short name, in upper or lower case, or raise UnknownNameError."""
     known, name_or_code = RULES | OF_OTHERS, word.strip().lower()
     codes = CODES | {name: rule.id for rule in OF_OTHERS.values() for name in (rule.id.lower(), rule.slug)}
     if name_or_code not in codes:
@@ -126,8 +117,7 @@ def find_rule(word: str) -> Rule:
 def find_rules(word: str) -> tuple[Rule, ...]:
     """Return the rules for a code, a short name, the first digits of codes, or ALL.
 
-    Raises:
-        UnknownNameError: there is no such rule. The message lists the nearest names.
+    Raise UnknownNameError if there is no such rule.
 
     >>> [rule.id for rule in find_rules("rounded-pi")], len(find_rules("URDF30"))
     (['URDF601'], 5)
@@ -141,14 +131,13 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     return family if family and prefix.lstrip(string.ascii_uppercase) else (find_rule(word),)
 
 
-#: Largest number of characters in a line of an example. Longer lines are cut.
+#: Longer lines of an example are cut.
 _WIDEST = 100
 #: Width of prose on a terminal, in characters.
 WIDTH = 88
 
 
 def explain(rule: Rule) -> str:
-    """Return the page of a rule as plain text."""
     content = page(rule.id)
     paragraphs = [
         f"{rule.id} {rule.slug} ({rule.severity.value})",

@@ -88,12 +88,10 @@ class Examined:
     """The result of a check.
 
     Attributes:
-        text: The text.
         data: The bytes of the text without a byte order mark. The line and column numbers and the fixes of
             the findings refer to positions in `data`.
         robot: The records of the robot; None if the text is not a URDF.
-        findings: The findings by line.
-        silenced: Pairs of a finding that a comment silences, and the reason in this comment.
+        silenced: The findings that a comment silences, each with the reason in this comment.
     """
 
     text: Text
@@ -112,16 +110,9 @@ def examine(
     fold: bool = False,
     wanted: Callable[[Finding], bool] | None = None,
 ) -> Examined:
-    """Check a text that `read_source` has returned.
+    """Check a text that `read_source` has returned, with the arguments of `check`.
 
-    Args:
-        text: The text.
-        limits: As for `check`.
-        mimic: As for `check`.
-        root_joint: As for `check`.
-        fold: As for `check`.
-        wanted: A function that returns whether to report a finding. It is called before urdfkin combines
-            findings. None: all findings are reported.
+    `wanted` returns whether to report a finding, before findings are combined.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
@@ -142,14 +133,9 @@ def file_of(text: Text) -> Path | None:
 
 
 def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
-    """Check the bytes of a URDF and return the findings by line.
+    """Check the bytes of a URDF and return the findings by line, with the arguments of `check`.
 
     The function opens no file and no connection, and uses neither yourdfpy nor Pinocchio.
-
-    Args:
-        data: The bytes.
-        limits: Limits on the size of the file, its elements, names and numbers.
-        fold: As for `check`.
 
     >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
     []
@@ -160,18 +146,11 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 
 
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
-    """Parse and check the bytes in a reporter, and return the records of the robot.
+    """Parse and check the bytes in a reporter, and return the records; None if the file is not a URDF.
 
-    Args:
-        report: A reporter with the name, the bytes and the limits of the file. The function adds findings to
-            it.
-        mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
-            are notes.
-        root_joint: `"floating"` or `"planar"` if the robot gets such a joint. The file must not contain the
-            names of this additional joint and of its parent link.
-
-    Returns:
-        The records, or None if the file is not a URDF.
+    If `mimic` is False, mimic joints move freely, and all findings about them are notes. The kind
+    `root_joint`, "floating" or "planar", adds a joint; the file must not contain the names of this joint and
+    its parent link.
     """
     root = read_document(report)
     read_comments(report, CODES)

@@ -1,6 +1,6 @@
 """Find the files and the settings for `urdfkin check`, and select the findings to report.
 
-The arguments of `urdfkin check` are files, folders or patterns. Settings are in pyproject.toml:
+Settings are in pyproject.toml. Their files and patterns are relative to the folder of this file:
 
     [tool.urdfkin]
     ignore = ["URDF601"]
@@ -8,13 +8,10 @@ The arguments of `urdfkin check` are files, folders or patterns. Settings are in
     baseline = "urdfkin-baseline.json"
     per-file-ignores = { "legacy/*" = ["URDF5"] }
 
-Files and patterns are relative to the folder of pyproject.toml. urdfkin reports a finding if its code is
-selected and the finding is new. A new finding is neither in the baseline nor in the older version of the
-file.
-
-A baseline is a JSON file with known findings. A finding is known if an entry of the baseline has the same
-file, code, severity, element, name and found text. urdfkin does not compare the line numbers. A finding
-therefore stays known after you edit other lines. If you change the found text, the finding is new.
+urdfkin reports a finding if its code is selected and the finding is neither in the baseline nor in the older
+version of the file. A baseline is a JSON file with known findings. A finding is known if an entry has the
+same file, code, severity, element, name and found text. The line numbers are not compared, so a finding stays
+known after you edit other lines.
 """
 
 from __future__ import annotations
@@ -48,7 +45,6 @@ _FIELDS = ("file", "code", "severity", "element", "name", "found")
 
 
 def key_of(finding: Finding, file: str) -> Key:
-    """Return the key that identifies a finding in a baseline."""
     words = (finding.severity.value, finding.element or "", finding.name or "", finding.found or "")
     return (file, finding.code, *words)
 
@@ -58,7 +54,7 @@ class Baseline:
     """The known findings, and how many findings of this run match them.
 
     Attributes:
-        counts: For each key: the number of known findings that no finding of this run has matched yet.
+        counts: Number of known findings, by key, that no finding of this run has matched yet.
         root: The folder to which the file names in the keys are relative.
         met: The number of findings of this run that matched a known finding.
     """
@@ -77,7 +73,7 @@ class Baseline:
         return True
 
     def gone(self, files: Iterable[str]) -> int:
-        """For the checked files, return the number of known findings that no longer occur."""
+        """Return the number of known findings that no longer occur in the checked files."""
         checked = {relative(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
@@ -91,12 +87,7 @@ def relative(file: str, root: Path) -> str:
 
 
 def read_baseline(path: Path) -> Baseline:
-    """Read a baseline.
-
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: the file is not a baseline.
-    """
+    """Read a baseline; raise SourceError or InputError if the file cannot be read or is no baseline."""
     try:
         document = json.loads(read_text(path))
         if document["schema"] != "urdfkin-baseline" or document["version"] != BASELINE_VERSION:
@@ -117,17 +108,10 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """Return the text of a baseline file with the given findings.
+    """Return a baseline with the findings of the checked `files`.
 
-    If there already is a baseline at `path`, copy its entries about other files that still exist.
-
-    Args:
-        findings: The findings of the checked files.
-        files: The checked files.
-        path: The path of the new baseline.
-
-    Raises:
-        InputError: the path has a file that is not a baseline.
+    Entries of an older baseline at `path` about other existing files are copied. If the file at `path` is not
+    a baseline, raise InputError.
     """
     counts = Counter(key_of(finding, relative(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -141,7 +125,7 @@ def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path)
     return json.dumps(document, indent=1) + "\n"
 
 
-#: For each setting: its type.
+#: The type of each setting.
 _KINDS = {
     "select": list, "ignore": list, "per-file-ignores": dict, "strict": bool, "notes": bool,
     "include": list, "exclude": list, "baseline": str,
@@ -153,19 +137,13 @@ _WORDS = {
     str: "a string",
 }
 
-#: Patterns of robot files in a folder.
-#: Files with the suffix .xacro are not included, because most contain only a part of a robot.
+#: Robot files in a folder match these patterns. Most .xacro files contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """A table of settings.
-
-    Attributes:
-        file: The file with the table; None if there is none.
-        values: For each setting: its value, whose type was checked.
-    """
+    """A table of settings, whose types were checked; `file` is None if there is no table."""
 
     file: Path | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -176,7 +154,6 @@ class Settings:
         return Path() if self.file is None else self.file.parent
 
     def ignored_in(self, file: str) -> frozenset[str]:
-        """Return the codes that `per-file-ignores` ignores in a file."""
         table = self.values.get("per-file-ignores", {}).items()
         return codes(
             word for pattern, words in table if matches(file, [pattern], self.root) for word in words
@@ -186,12 +163,9 @@ class Settings:
 def find_settings(start: Path) -> Settings:
     """Return the settings that apply in a folder; empty settings if there is no table [tool.urdfkin].
 
-    The function looks for the table in pyproject.toml of this folder and of the folders above it, up to the
-    first folder that contains .git.
-
-    Raises:
-        SourceError: a pyproject.toml cannot be read.
-        InputError: a pyproject.toml is not TOML, or a setting in it is wrong.
+    The table is in pyproject.toml of this folder or of a folder above it, up to the first folder that
+    contains .git. Raise SourceError if a pyproject.toml cannot be read, and InputError if it is not TOML or a
+    setting is wrong.
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
@@ -205,9 +179,8 @@ def find_settings(start: Path) -> Settings:
 def read_settings(file: Path) -> Settings:
     """Return the settings in the table [tool.urdfkin] of a given file.
 
-    Raises:
-        SourceError: the file cannot be read.
-        InputError: the file has no such table, or a setting in the table is wrong.
+    Raise SourceError if the file cannot be read, and InputError if it has no such table or a setting is
+    wrong.
     """
     if (found := _table(file, pipes=True)) is None:
         raise InputError(
@@ -253,10 +226,7 @@ def _is_list_of_strings(value: Any) -> bool:
 
 
 def codes(words: Iterable[str]) -> frozenset[str]:
-    """Return all codes that `find_rules` finds for the given words.
-
-    Raises:
-        UnknownNameError: a word is neither a code nor a short name.
+    """Return the codes of all rules that `find_rules` finds for the given words, or raise UnknownNameError.
 
     >>> sorted(codes(["rounded-pi", "URDF52"]))[:3]
     ['URDF520', 'URDF521', 'URDF522']
@@ -281,7 +251,7 @@ def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
     )
 
 
-#: Suffixes of the files that a xacro file can include.
+#: A xacro file can include files with these suffixes.
 _PARTS = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 
@@ -292,8 +262,6 @@ class Choice:
     Attributes:
         codes: The selected codes.
         notes: Whether notes are reported.
-        settings: The settings in pyproject.toml. For example, they name codes that are ignored in certain
-            files.
         baseline: The known findings, or None. The baseline object counts the matched findings.
     """
 
@@ -305,29 +273,21 @@ class Choice:
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        The returned function counts the findings that match a baseline. Therefore, call it exactly once for
-        each finding of the file, in the order of the findings.
-
-        Args:
-            text: The file.
-            before: The findings in an older version of the file, as a baseline; or None.
+        Call the function exactly once for each finding of the file, in order, because it counts the findings
+        that match a baseline. `before` is a baseline with the findings in an older version of the file.
         """
         codes = self.codes - self.settings.ignored_in(text.label)
         known = [baseline for baseline in (self.baseline, before) if baseline is not None]
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # not `any`, which stops after the first match: each baseline must count the finding
+            # `any` would stop after the first match, but each baseline must count the finding.
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return the same function as `of`, but for a second check of the same file.
-
-        The returned function works on copies of the baselines, so that the second check does not change the
-        counts.
-        """
+        """Return the same filter as `of` with copies of the baselines, for a second check of a file."""
         copies = [
             None if known is None else replace(known, counts=Counter(known.counts))
             for known in (self.baseline, before)
@@ -336,23 +296,17 @@ class Choice:
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """Return the findings of an older version of a file.
+    """Return the findings of an older version of a file, which `look` finds.
 
     If neither the file nor a file that it uses has changed, the findings are the same, and None is returned.
-
     If a mesh file was deleted after the older version, the finding about the missing mesh counts as new.
-
-    Args:
-        text: The present file.
-        version: The older version of the repository.
-        look: A function that checks a text and returns all findings.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # The older xacro file cannot be expanded. If a file that the xacro file may include has changed,
-        # urdfkin treats every finding as new.
+        # The older xacro file cannot be expanded.
+        # If a file that the xacro file may include has changed, every finding is new.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)
@@ -364,22 +318,16 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     return Baseline(Counter(key_of(finding, relative(finding.file, Path())) for finding in found))
 
 
-#: Marker files of ROS's build tools. A folder that contains such a file is skipped.
+#: ROS's build tools and urdfkin skip a folder that contains one of these files.
 LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 def collected(word: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """Return the files for one argument, sorted by name.
+    """Return the files for one argument, sorted by name; raise SourceError if there is none.
 
-    Args:
-        word: A file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[`, `**`.
-        settings: The settings. The patterns in `exclude` are relative to the folder of these settings.
-        include: Patterns of file names to select in a folder.
-        exclude: Patterns of files and folders to skip. A file that the user names as the argument is not
-            skipped.
-
-    Raises:
-        SourceError: a folder or pattern contains no file.
+    The argument `word` is a file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[`, `**`. The
+    patterns `include` select file names in a folder. The patterns `exclude` skip files and folders, except a
+    file that the user names.
     """
     path = Path(word)
     if word == "-" or word in catalogue():
@@ -414,5 +362,5 @@ def _below(folder: Path, root: Path, include: Sequence[str], exclude: Sequence[s
 
 def _matching(pattern: str) -> list[str]:
     # Path.glob accepts neither absolute patterns nor "..".
-    names = map(Path, glob.glob(pattern, recursive=True))  # noqa: PTH207
+    names = map(Path, glob.glob(pattern, recursive=True))  # noqa: PTH207  Path.glob() refuses some patterns
     return sorted(as_word(name) for name in names if not is_folder(name))

@@ -18,26 +18,23 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Largest plausible mass (kg) and distance of the centre of mass from the link's origin (m).
-#: Larger values are reported.
+#: A larger mass (kg) or distance of the centre of mass from the origin (m) is reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: If the mass (kg) of a body is below this number, urdfkin treats the mass as a placeholder, and does not
-#: check the body's moments of inertia.
+#: A smaller mass (kg) is probably a placeholder: its moments of inertia are not checked.
 NEGLIGIBLE = 1e-3
 
 #: Moments of inertia per kg (m^2) below this number count as rounding errors.
 #: Only bodies smaller than about 0.03 mm have such small moments.
 ROUNDING = 1e-9
 
-#: Allowed relative rounding error of moments of inertia, which is large because exporters write few digits.
+#: Moments of inertia have relative rounding errors of this size, because exporters write few digits.
 _WRITTEN = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def check_inertials(report: Reporter, robot: RobotRecord) -> None:
-    """Check the inertial of each link."""
     numbers = NumberReader(report, UNREADABLE, UNREADABLE)
     for link in robot.links.values():
         inertial = link.first("inertial")
@@ -130,8 +127,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
 def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
     """Return the eigenvalues of an inertia tensor, smallest first, by the trigonometric cubic formula.
 
-    Args:
-        moments: ixx, ixy, ixz, iyy, iyz, izz.
+    The moments are ixx, ixy, ixz, iyy, iyz, izz.
 
     >>> principal_moments([1.0, 0.0, 0.0, 2.0, 0.0, 3.0])
     (1.0, 2.0, 3.0)
@@ -157,7 +153,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: For each shape: its numeric attributes, as (name, count of numbers, whether the attribute is required).
+#: A numeric attribute of a shape has a name and a count of numbers, and may be required.
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),
@@ -168,7 +164,6 @@ _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
 
 
 def check_shapes(report: Reporter, robot: RobotRecord) -> None:
-    """Report invalid and incomplete shapes."""
     numbers = NumberReader(report, UNREADABLE, UNREADABLE)
     for link in robot.links.values():
         for shape in link.children:
@@ -234,7 +229,6 @@ MATERIAL_TWICE = Rule("URDF709", "material-twice", ERROR)
 
 
 def check_materials(report: Reporter, robot: RobotRecord) -> None:
-    """Check the materials of the robot and of each visual."""
     defined = _materials(report, robot)
     for link in robot.links.values():
         for visual in link.all("visual"):
@@ -242,7 +236,6 @@ def check_materials(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
-    """Return the names of the defined materials, and report names with two definitions."""
     defined: dict[str, Element] = {}
     for material in robot.element.all("material"):
         name = material.attributes.get("name", "")
@@ -290,11 +283,7 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
     """Report each missing mesh file. If a package is not found, report it only once.
 
-    Args:
-        report: This object collects the findings.
-        root: The root element of the document.
-        beside: The file of the URDF; None if the URDF is text. For text, urdfkin searches only for meshes
-            with `package://`, in the search paths of the environment.
+    `beside` is the file of the URDF, or None for text, in which only `package://` meshes are searched.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
@@ -326,7 +315,6 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
 
 
 def check_address(report: Reporter, mesh: Element) -> None:
-    """Report a mesh with an address on the network."""
     filename = mesh.attributes["filename"]
     if filename.lower().startswith(("http:", "https:", "ftp:")):
         report.add(
@@ -348,10 +336,7 @@ def _meshes(root: Element) -> Iterator[Element]:
 
 
 def _is_missing_file(filename: str, beside: Path | None) -> bool:
-    """Return whether the address of a mesh is a file path that does not exist.
-
-    A relative path is relative to the folder of the URDF.
-    """
+    """Return whether the address of a mesh is a file path, relative to the URDF, that does not exist."""
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if beside is None or not local:
         return False

@@ -36,7 +36,7 @@ NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
 _T = TypeVar("_T")
 
-#: Elements of an SRDF, which accompanies a URDF.
+#: An SRDF, which accompanies a URDF, has these elements.
 _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_collisions", "passive_joint"}
 
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
@@ -45,10 +45,7 @@ _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 
 def check_dialect(report: Reporter, root: Element) -> None:
-    """Report a robot without a name or without links.
-
-    Report unexpanded xacro, includes and a default namespace.
-    """
+    """Report a robot without a name or links, unexpanded xacro, includes and a default namespace."""
     prefixes = _prefixes(root)
     _check_namespaces(report, root, prefixes)
     _check_name(report, root)
@@ -61,7 +58,7 @@ def check_dialect(report: Reporter, root: Element) -> None:
 
 
 def _prefixes(root: Element) -> dict[str, str]:
-    """Return all namespace declarations in the document, as a mapping from prefixes to namespaces."""
+    """Return the namespaces that the document declares, by prefix."""
     return {
         key.removeprefix("xmlns:"): value
         for element in root.walk()
@@ -71,7 +68,6 @@ def _prefixes(root: Element) -> dict[str, str]:
 
 
 def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str]) -> None:
-    """Report a default namespace, unexpanded xacro and includes."""
     if "xmlns" in root.attributes:
         report.add(
             NAMESPACE,
@@ -151,7 +147,7 @@ def _moves(element: Element) -> bool:
 
 
 def _partition(items: Iterable[_T], predicate: Callable[[_T], bool]) -> tuple[list[_T], list[_T]]:
-    """Return two lists: the items for which the predicate is true, and the others. The order is kept."""
+    """Return the items for which the predicate is true, and the others."""
     parts: tuple[list[_T], list[_T]] = ([], [])
     for one in items:
         parts[not predicate(one)].append(one)
@@ -186,18 +182,18 @@ UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
 DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
-#: Extension elements with any content, even `<joint>` and `<link>`.
+#: Extension elements may have any content, even `<joint>` and `<link>`.
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
 
-#: Elements and attributes that simulators and vendors add in widely used robots.
+#: Simulators and vendors add these elements and attributes in widely used robots.
 _ADDED = (
     "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
     " mu_coulomb mu_viscous current command_effort gear_velocity"
 )
 EXTENSIONS = frozenset(_ADDED.split())
 
-#: Each line has the form `element: attributes > child elements`. If a line has no colon, urdfkin does not
-#: check the attributes of the element. urdfkin does not check elements that are not in this table.
+#: Each line has the form `element: attributes > child elements`.
+#: Attributes of an element without a colon, and elements that are not in this table, are not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -224,23 +220,22 @@ ATTRIBUTES = {
     if colon
 }
 
-#: Elements and attributes of other formats for poses, which URDF readers skip.
+#: URDF readers skip these elements and attributes for poses in other formats.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Attributes that URDF defines for other elements, or that other formats define. `--fix` does not remove
-#: them.
+#: `--fix` does not remove these attributes of other elements or formats.
 _MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
-#: For each element: the child elements that may occur only once.
+#: These child elements may occur only once in an element.
 _ONCE = {
     **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
 }
 
-#: Elements that have their values in attributes. Readers ignore text between their tags.
+#: Readers ignore text between the tags of these elements.
 _VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
 
-#: In these elements, any text between the tags is a value that belongs in an attribute.
+#: Text between the tags of these elements is a value that belongs in an attribute.
 _VECTORS = ("origin", "axis")
 
 
@@ -354,7 +349,7 @@ def _check_text(report: Reporter, element: Element) -> None:
     if not element.text or element.tag not in _VALUES | {"robot", "joint", "link"}:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
-        return  # the finding about the missing attribute `link` already quotes this text
+        return  # another finding already quotes this text
     lost = element.tag in _VECTORS and not element.attributes
     example = _EXAMPLES.get(element.tag)
     report.add(
@@ -398,22 +393,18 @@ UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 #: Prefixes that XML declares itself.
 _PREDECLARED = ("xml", "xmlns")
 
-#: The rules URDF202 and URDF112 report names with these beginnings. Therefore, the check of undeclared
-#: prefixes skips them.
+#: Other rules (URDF202 and URDF112) report names that begin with these words.
 _REPORTED = ("xacro:", "xi:include")
 
 
 @dataclass(slots=True)
 class _Use:
-    """The first use of a prefix, and the number of uses."""
-
     element: Element
     attribute: str | None
     times: int = 0
 
 
 def check_prefixes(report: Reporter, root: Element) -> None:
-    """Report each undeclared prefix once."""
     for prefix, use in _undeclared_prefixes(root).items():
         more = f" and {use.times - 1} more" if use.times > 1 else ""
         report.add(
@@ -427,7 +418,6 @@ def check_prefixes(report: Reporter, root: Element) -> None:
 
 
 def _undeclared_prefixes(root: Element) -> dict[str, _Use]:
-    """Return the undeclared prefixes, each with its first use and the number of uses."""
     found: dict[str, _Use] = {}
     declared = Counter(_PREDECLARED)
     stack = [(root, False)]
@@ -462,18 +452,14 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Longest name, in characters, that is not reported. Longer names break tables and file paths.
+#: A name with more characters is reported, because it breaks tables and file paths.
 LONGEST = 200
 
 
 def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
     """Report names that are reserved, easily confused, or troublesome for other programs.
 
-    Args:
-        report: This object collects the findings.
-        robot: The records of the robot.
-        root_joint: Kind of the additional joint `root_joint` whose parent is a link `universe`; None if the
-            robot gets no such joint.
+    The kind `root_joint` is None if the robot gets no additional joint `root_joint` below a link `universe`.
     """
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
@@ -550,7 +536,7 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
     seen: dict[str, str] = {}
     for name, element in named:
         if name.isascii() or len(name) > LONGEST:
-            continue  # a long name has its own finding, and is slow to compare
+            continue  # a long name has another finding, and is slow to compare
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
@@ -572,11 +558,9 @@ _BETWEEN = re.compile(r"[,\s]+")
 
 
 def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
-    """Apply the comments that silence findings in a document, and report invalid comments.
+    """Apply the comments that silence findings, and report invalid comments.
 
-    Args:
-        report: The reporter of the file.
-        codes: Maps each name of a rule, in lower case, to the code of the rule.
+    `codes` is the code of each rule by its names in lower case.
     """
     silences = Silences()
     for comment in report.comments:
@@ -612,10 +596,7 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
 
 
 def check_unused(report: Reporter) -> None:
-    """Report each code in an `ignore` comment that does not silence any finding.
-
-    This function must be called after all other rules.
-    """
+    """Report each code in an `ignore` comment that does not silence any finding, after all other rules."""
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:

@@ -1,8 +1,7 @@
 """Check that joints connect all links in one tree and have usable axes, limits and mimic rules.
 
 The module also reports legal values that are probably mistakes: rounded pi, degrees, millimetres, equal
-joints. All functions are iterative, because a chain of 50,000 links would exceed the recursion
-limit.
+joints. No function is recursive, because a chain of 50,000 links would exceed the recursion limit.
 """
 
 from __future__ import annotations
@@ -140,10 +139,10 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # a joint with a missing or wrong child was already reported
+        return False  # another finding reports the joint with a wrong child
     parents = {joint.parent for joint in robot.joints}
-    # Of the links without a parent, urdfkin treats the first one with children as the root of the robot. It
-    # reports the others, because no joint connects them with this root.
+    # The root of the robot is the first link with children and without a parent.
+    # The other links without a parent are not connected with this root.
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
@@ -162,20 +161,18 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If the length of an axis differs from 1 by less than this number, urdfkin reports a note instead of a
-#: warning. Axes that are written with few digits have differences of this size.
+#: If the length of an axis differs from 1 by less than this number, the finding is only a note.
+#: Axes that are written with few digits have differences of this size.
 LENGTH_ROUNDING = 2e-4
 
-#: Largest difference between 1 and the length of a unit vector. `kinematics.inputs` has the same tolerance.
+#: The length of a unit vector differs from 1 by at most this number, as in `kinematics.inputs`.
 _ONE = 1e-12
 
-#: If the x and y components of a planar joint's axis are below this fraction of its z component, the axis is
-#: treated as the z axis.
+#: A z axis has x and y components below this fraction of its z component.
 _LEAN = 1e-9
 
-#: If a joint axis differs from a coordinate axis by less than this relative tolerance, Pinocchio uses the
-#: coordinate axis. The number is the default tolerance of Eigen's function `isApprox`, which compares squared
-#: lengths.
+#: Pinocchio replaces an axis by a coordinate axis within this relative tolerance.
+#: Eigen's function `isApprox`, which compares squared lengths, has this default tolerance.
 _SNAPPED = 1e-12
 
 #: A tilt (rad) below this number is not reported, because the error bounds in `verify.bounds` include it.
@@ -183,7 +180,6 @@ _TILT = 2.0**-52
 
 
 def check_axes(report: Reporter, robot: RobotRecord) -> None:
-    """Report axes without a direction, axes that are not unit vectors, and axes that are not used."""
     for joint in robot.joints:
         if joint.kind in AXIAL:
             _check_axis(report, joint)
@@ -237,7 +233,7 @@ def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
     with localcontext(prec=60):
         numbers = [Decimal(x) for x in vector]
         length = sum((x * x for x in numbers), Decimal(0)).sqrt()
-        return tuple(float(x / length) + 0.0 for x in numbers)  # + 0.0 turns -0.0 into 0.0
+        return tuple(float(x / length) + 0.0 for x in numbers)  # `+ 0.0` turns -0.0 into 0.0
 
 
 def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
@@ -264,7 +260,7 @@ def tilts(robot: RobotRecord) -> dict[str, float]:
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses for an axis, and the angle between them (rad).
 
-    Return None if Pinocchio uses the axis unchanged.
+    The result is None if Pinocchio uses the axis unchanged.
     """
     if axis is None:
         return None
@@ -303,14 +299,13 @@ NEGATIVE_LIMIT = Rule("URDF509", "negative-limit", WARNING, REFUSES)
 
 
 def check_ranges(report: Reporter, robot: RobotRecord) -> None:
-    """Check the `<limit>` of each joint."""
     for joint in robot.joints:
         if joint.limit is not None:
             _check_limit(report, joint, joint.limit, robot.version)
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # for URDF 1.2 or newer, urdfdom has the same rules for all joint types
+    strict = version >= (1, 2)  # from URDF 1.2 on, urdfdom has the same rules for all joint types
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -376,22 +371,15 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: Largest plausible multiplier and offset (rad or m) of a mimic joint. Larger values are reported.
+#: A larger multiplier or offset (rad or m) of a mimic joint is reported.
 LARGEST = 1e6
-#: If the limits of a mimic joint are too narrow, the mimicked joint cannot use its full range. If the
-#: unusable fraction of the range is below this number, there is no finding, because limits are often written
-#: with few digits.
+#: A smaller unusable fraction of a mimicked joint's range is not reported.
+#: Limits of mimic joints are often written with few digits.
 LEAST_LOST = 1e-3
 
 
 def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
-    """Report problems of mimic joints.
-
-    Args:
-        report: This object collects the findings.
-        robot: The records of the robot.
-        enabled: Whether the mimic rules are used. False: every finding is a note.
-    """
+    """Report problems of mimic joints. If the mimic rules are not enabled, every finding is a note."""
     checker = _MimicChecker(report, robot.by_name, enabled)
     for joint in robot.joints:
         if joint.mimic is not None:
@@ -399,8 +387,6 @@ def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
 
 
 class _MimicChecker:
-    """Check one mimic joint after another."""
-
     def __init__(self, report: Reporter, joints: dict[str, JointRecord], enabled: bool) -> None:
         self.report, self.joints, self.enabled = report, joints, enabled
         self.in_loops = _joints_in_loops(joints)
@@ -414,7 +400,6 @@ class _MimicChecker:
         remedy: str,
         fix: Callable[[], Fix | None] | None = None,
     ) -> None:
-        """Add a finding at an attribute of a `<mimic>`."""
         written = mimic.element.attributes.get(attribute)
         self.report.add(
             code,
@@ -428,7 +413,6 @@ class _MimicChecker:
         )
 
     def check(self, joint: JointRecord, mimic: MimicRecord) -> None:
-        """Check one mimic joint."""
         if joint.kind == "fixed":
             self.add(
                 parser.IGNORED,
@@ -458,7 +442,6 @@ class _MimicChecker:
             self.check_sound(joint, mimic, leader)
 
     def unknown(self, mimic: MimicRecord) -> None:
-        """Report a mimic rule whose mimicked joint does not exist."""
         nearest = self.report.nearest(mimic.leader, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
@@ -466,7 +449,6 @@ class _MimicChecker:
         self.add(MIMIC_UNKNOWN, "the mimicked joint does not exist", mimic, "joint", remedy)
 
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
-        """Report probable mistakes in a valid mimic rule."""
         if mimic.multiplier == 0.0:
             self.add(
                 MIMIC_CONSTANT,
@@ -482,8 +464,7 @@ class _MimicChecker:
         if joint.kind == "continuous":
             self.add(
                 MIMIC_CONTINUOUS,
-                "a continuous joint mimics another: Pinocchio itself accepts this for a continuous mimicked"
-                " joint only",
+                "a continuous joint mimics another: Pinocchio accepts this only if both are continuous",
                 mimic,
                 "joint",
                 'write type="revolute" for the mimic joint',
@@ -501,8 +482,8 @@ class _MimicChecker:
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
         """Check that the limits of a mimic joint allow the full range of the mimicked joint."""
-        from urdfkin.model.configuration import kept_range, range_words  # noqa: PLC0415  most files need no numpy
-        from urdfkin.model.tree import Limit  # noqa: PLC0415
+        from urdfkin.model.configuration import kept_range, range_words  # noqa: PLC0415  few files need NumPy
+        from urdfkin.model.tree import Limit  # noqa: PLC0415  few files need NumPy
 
         rule, leader = self.resolved(mimic)
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
@@ -531,7 +512,7 @@ class _MimicChecker:
 
         The joint is None if the chain of mimic rules is a circle, or names a joint that does not exist.
         """
-        from urdfkin.model.tree import Mimic  # noqa: PLC0415
+        from urdfkin.model.tree import Mimic  # noqa: PLC0415  few files need NumPy
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
         leader = self.joints.get(rule.leader)
@@ -545,10 +526,7 @@ class _MimicChecker:
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the limits of a joint; for a continuous joint, one revolution.
-
-    Return None if the joint has no valid limits.
-    """
+    """Return the limits of a joint, one revolution for a continuous joint, or None without valid limits."""
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -588,19 +566,17 @@ FAR = 100.0
 #: If the sum of all lengths of a robot is below this length (m), the lengths were probably scaled twice.
 TINY = 1e-4
 
-#: A limit that is a whole number, and at least `MANY`, is probably in degrees instead of radians. Limits of
-#: at least `ENDLESS` are not reported, because some exporters write them for a joint without limits.
+#: A limit that is a whole number of at least `MANY` is probably in degrees.
+#: Some exporters write limits of at least `ENDLESS` for a joint without limits.
 MANY, ENDLESS = 30.0, 1000.0
 
-#: If an angle is a rounded multiple of pi, the rounding moves the links below the joint. If it moves a link
-#: by more than this length (m), the finding is a warning.
+#: If a rounded multiple of pi moves a link by more than this length (m), the finding is a warning.
 NOTICEABLE = 1e-3
 
 #: An angle that differs from a multiple of pi by less than this angle (rad) is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Pairs of a multiple of pi, divided by pi, and a number of decimals. urdfkin recognizes the multiple of pi
-#: in a rounded number only if the number has at least so many decimals.
+#: A rounded multiple of pi is recognized only with at least this number of decimals.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -609,10 +585,7 @@ _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
 def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> None:
     """Report legal values that are probably mistakes.
 
-    Args:
-        report: This object collects the findings.
-        robot: The records of the robot.
-        sound: Whether the joints form a tree, so that lengths along chains are defined.
+    Lengths along chains are defined only if the joints form a tree (`sound`).
     """
     reach = _reach(robot) if sound else {}
     for joint in robot.joints:
@@ -687,15 +660,13 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
 def _replace_words(raw: str | None, words: list[str]) -> str:
     """Replace the words in a raw attribute value, but keep the white space between the words."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
-    if len(blanks) != len(words) + 1:  # the raw value has white space as `&#32;`
+    if len(blanks) != len(words) + 1:  # the raw value has references such as `&#32;`
         return " ".join(words)
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi that was probably rounded to a decimal, and the multiple's value.
-
-    Return None if there is no such multiple.
+    """Return the multiple of pi that was probably rounded to a decimal, and its value; None without one.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -721,7 +692,7 @@ def _as_pi(multiple: Fraction) -> str:
 def _metres(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
-    # Round the length to two significant digits; `:g` then writes it without an exponent.
+    # Round to two significant digits, so that `:g` writes no exponent.
     return f"{float(f'{length * factor:.1e}'):g} {unit}"
 
 
@@ -752,10 +723,7 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
-    """Report a joint whose limits exclude 0. In the neutral configuration, every joint value is 0.
-
-    Mimic joints are not checked.
-    """
+    """Report a joint whose limits exclude 0, the neutral joint value. Mimic joints are not checked."""
     limit = joint.limit
     if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
         return

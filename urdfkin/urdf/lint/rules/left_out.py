@@ -39,15 +39,15 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: Bytes of a file in which elements are searched.
+#: At most this number of bytes of a file is searched for elements.
 _SEARCHED = 10_000_000
-#: For the beginning of XML that is not an element: its end.
+#: XML that is not an element has these beginnings and ends.
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Elements of MJCF that are findings without a name, by tag.
+#: Findings about these MJCF elements have a tag without a name.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: A prim in the text form of USD, or the beginning of a comment, string, asset, array or scope, or its end.
+#: This pattern matches a prim in the text form of USD, and the ends of other content.
 _USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
-#: For the beginning of a part of USD without prims: the pattern of its end.
+#: Parts of USD without prims have these beginnings and ends.
 _NO_PRIM = {
     b"#": re.compile(rb"[\r\n]"),
     b"[": re.compile(rb"\]"),
@@ -55,19 +55,15 @@ _NO_PRIM = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: Line and column, from 1, and width of an element, by element and name.
+#: An element, by tag and name, has a line and a column, from 1, and a width.
 _Places = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
 def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, ...]:
     """Return a finding for each part of an MJCF file that the tree does not represent, and for each mistake.
 
-    The finding is a warning if the part affects the motion or is a probable mistake, otherwise a note.
-
-    Args:
-        listed: The parts and mistakes.
-        file: The file's name in messages.
-        data: The bytes of the file.
+    The finding is a warning if the part affects the motion or is a probable mistake, otherwise a note. `file`
+    is the file's name in messages.
     """
     found = [(one, *_element(one.where)) for one in listed]
     places = _placed(data, _elements) if any(element for _, element, _ in found) else {}
@@ -81,13 +77,7 @@ def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, 
 
 
 def of_usd(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, ...]:
-    """Return a finding for each remark about a USD stage. The name of the finding is the path of the prim.
-
-    Args:
-        remarks: The remarks.
-        file: The file's name in messages.
-        data: The bytes of the file.
-    """
+    """Return a finding for each remark about a USD stage. The name of the finding is the path of the prim."""
     found = tuple(remarks)
     rules = {rule.slug: rule for rule in globals().values() if isinstance(rule, Rule)}
     is_text = data.startswith(b"#usda") and any(one.where for one in found)
@@ -114,10 +104,7 @@ def _element(where: str | None) -> tuple[str | None, str | None]:
 
 
 def _placed(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
-    """Return the position of each element that `search` finds.
-
-    Of elements with the same name, use the first.
-    """
+    """Return the position of each element that `search` finds; of elements with the same name, the first."""
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_SEARCHED]):
         found.setdefault((element, name), (first, last))
@@ -134,8 +121,8 @@ def _placed(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | Non
 def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
     """Yield the tag, the name and the span of each MJCF element to which a finding can refer.
 
-    If an equality has no name, its number among all equalities is used instead. If the file includes other
-    files, this number is unknown, and the equality is skipped.
+    An equality without a name has its number among all equalities. If the file includes other files, this
+    number is unknown, and the equality is skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
@@ -176,7 +163,7 @@ def _prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
         if found[1] is not None:
             prim = "/" + found[1].decode("utf-8", "replace")
             yield "prim", "".join(above) + prim, found.start(), found.end()
-        elif token in b"()":  # metadata: its braces hold dictionaries
+        elif token in b"()":  # braces of metadata contain dictionaries
             inside += 1 if token == b"(" else -1
         elif token == b"{":
             above += [] if inside else [prim]
