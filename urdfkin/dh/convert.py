@@ -67,7 +67,7 @@ def _with(
     return replace(table, convention=convention, rows=rows, base=base, tool=tool)
 
 
-#: Limits that a prismatic joint without limits gets in a URDF: -1 km to 1 km, 1000 m/s, 1000 N.
+#: A prismatic joint without limits gets -1 km to 1 km, 1000 m/s and 1000 N in a URDF.
 UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
@@ -78,9 +78,6 @@ def to_tree(table: DHTable) -> KinematicTree:
     joint is not on the path, it becomes a separate joint on the base, so that the tree has the same
     coordinates as the table. A revolute joint without limits becomes continuous. A prismatic joint without
     limits gets -1 km to 1 km, because URDF requires limits.
-
-    Args:
-        table: Any table.
     """
     joints, here = list[tuple[Joint, str, str]](), link_names(table)
     for i, (row, T) in enumerate(zip(table.rows, frame_poses(table)[:-1], strict=True)):
@@ -99,10 +96,7 @@ def to_tree(table: DHTable) -> KinematicTree:
 
 
 def to_urdf(table: DHTable) -> str:
-    """Return a URDF of the table's robot, with the names and limits of `to_tree`.
-
-    The URDF has no shapes and no masses.
-    """
+    """Return a URDF with the names and limits of `to_tree`, and without shapes and masses."""
     return write_urdf(to_tree(table))
 
 

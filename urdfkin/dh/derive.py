@@ -90,8 +90,6 @@ class ParallelOffset(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """The options of a derivation; `urdfkin.dh.dh_table` explains them."""
-
     convention: Convention = Convention.STANDARD
     near_parallel: NearParallel = NearParallel.HAYATI
     last: Last = Last.TIP
@@ -145,14 +143,10 @@ def choices_of(
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
     """Return the table of a chain.
 
-    The product base . rows . tool equals the pose of the chain's tip for every q, except for rounding.
-
-    Args:
-        chain: The path.
-        choices: The options.
-        like: A standard table of the same joints. The result has the same directions of x and the same
-            offsets along parallel axes. The zero positions of the first and the last joint are also the same.
-            If `like` and `choices` contradict each other, `like` is used.
+    The product base . rows . tool equals the pose of the chain's tip for every q, except for rounding. `like`
+    is a standard table of the same joints. The result has the same directions of x, the same offsets along
+    parallel axes, and the same zero positions of the first and the last joint. If `like` and `choices`
+    contradict each other, `like` is used.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -194,7 +188,6 @@ def _table(
     steps: list[Step],
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
-    """Make the table in the chosen convention."""
     if choices.convention is Convention.MODIFIED and turns:
         first = as_step(ends[0])
         a, alpha = first or (0.0, 0.0)
@@ -245,10 +238,9 @@ def _use_freedom_of_prismatic_axes(
     A prismatic motion commutes with every translation. Therefore, the axis line of a prismatic joint can be
     shifted without a change of the tip's poses. If the first joint is prismatic, its axis line passes through
     the base's origin, so that the base can be the identity. If the last joint is prismatic, its axis line
-    passes through the tip, unless the table needs a tool anyway. In a table without Hayati rows, urdfkin
-    checks whether a prismatic axis is nearly parallel to the axis of a neighbouring joint. If the prismatic
-    axis is nearly parallel, its line is shifted to the origin of the neighbouring joint. Otherwise, the
-    common normal would be far from the robot.
+    passes through the tip, unless the table needs a tool anyway. In a table without Hayati rows, a prismatic
+    axis that is nearly parallel to a neighbouring axis is shifted to the origin of the neighbouring joint.
+    Otherwise, the common normal would be far from the robot.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
@@ -325,9 +317,9 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
     base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
     if tilt_of(A) <= noise.radians:  # z_0 is parallel or opposite to the base's z axis
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # This is x - (x . z) z for unit vectors, in a form that avoids cancellation for z close to x.
+    # This formula for x - (x . z) z with unit vectors avoids cancellation for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis, so use the y axis
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis.
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -337,7 +329,6 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
 
 
 def _clean_rotation(T: FloatArray) -> None:
-    """Set the entries of the rotation that are rounding noise to zero."""
     R = T[:3, :3]
     R[np.abs(R) <= ENTRY * EPS] = 0.0
 
@@ -469,8 +460,7 @@ def _last(
 def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
     """Add the offsets along consecutive parallel axes, and write the sum into the first row of these axes.
 
-    If two axes have the same direction (alpha = 0), the offset along the second axis is added. If the axes
-    have opposite directions (alpha = pi), the offset along the second axis is subtracted.
+    The offset along the second of two axes is added if alpha = 0, and subtracted if alpha = pi.
     """
     moved = list(rows)
     for i in range(len(steps) - 1, -1, -1):

@@ -45,7 +45,6 @@ class Literal(float):
     text: str
 
     def __new__(cls, text: str) -> Literal:
-        """Parse the number, and store its text."""
         number = super().__new__(cls, text)
         number.text = text
         return number
@@ -54,8 +53,7 @@ class Literal(float):
 def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
     """Return, for each row, half a unit of the last digit of each cell, in metres and radians.
 
-    Args:
-        data: A valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
+    `data` is a valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
     """
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     return tuple(_of_row(row, units) for row in data["rows"])
@@ -77,9 +75,8 @@ def _of_row(row: Mapping[str, Any] | Sequence[Any], units: Units) -> dict[str, f
 def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     """Return half a unit of a written number's last digit; 0 if the number is exact.
 
-    Example:
-        >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
-        (5e-05, 0.0, 0.5, 0.0)
+    >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
+    (5e-05, 0.0, 0.5, 0.0)
     """
     text = value.text if isinstance(value, Literal) else str(value)
     text = (cell_of(value).text or "0") if isinstance(value, str) else text
@@ -93,8 +90,7 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     return 0.5 * 10.0 ** min(exponent, 0)
 
 
-#: Order of the cells in a row that is a list. The list may also have "R" or "P" at the end.
-#: A row with beta must be a mapping.
+#: A row that is a list has its cells in this order, and may end with "R" or "P".
 ORDER = ("a", "alpha", "d", "theta")
 _KINDS = {
     "r": JointKind.REVOLUTE,
@@ -108,15 +104,9 @@ _BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order 
 
 
 def written_row(row: Any, index: int, units: Units) -> DHRow:
-    """Parse a handwritten row.
+    """Parse a handwritten row: a `DHRow`, a mapping of its fields, or a list in the order of `ORDER`.
 
-    Args:
-        row: A `DHRow`, a mapping of its fields, or a list in the order of `ORDER`.
-        index: Index of the row, from 0.
-        units: Units of its numbers.
-
-    Raises:
-        InputError: the row has another type or an invalid cell; the message names the row and the column.
+    `index` counts from 0. InputError names the row and the column.
     """
     if isinstance(row, DHRow):
         return row
@@ -137,15 +127,12 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
 
 
 def refuse_other_order(rows: Sequence[Any]) -> None:
-    """Reject rows, given as lists, that seem to be in the Robotics Toolbox's order theta, d, a, alpha.
+    """Raise InputError for lists that seem to have the Robotics Toolbox's order theta, d, a, alpha.
 
     Angles of a table are nearly always multiples of 15 degrees. Lengths hardly ever look like such angles. In
     the Robotics Toolbox's order, the first and the fourth column contain angles, and the second column
     contains lengths. Rows are rejected if the first and the fourth column look like angles, and the second
     column looks like lengths.
-
-    Raises:
-        InputError: the columns seem to be in the other order; the message names the two orders.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
@@ -360,8 +347,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys that do not change the table.
-#: These keys contain information, for example the source of the numbers and the URDF of the same robot.
+#: These keys, for example the source of the numbers, do not change the table.
 NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 
@@ -432,8 +418,7 @@ def table_from_rows(
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     """Make a table from a mapping in the form that the module's docstring shows.
 
-    Raises:
-        InputError: the mapping has no convention or an unknown key, or `table_from_rows` raises an error.
+    InputError is raised without a convention, for an unknown key, and as in `table_from_rows`.
     """
     if "convention" not in data:
         raise InputError(

@@ -42,15 +42,12 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws. The length of an axis may differ from 1 by at most this number. The pitch
-#: (m/rad) of a revolute joint's screw may differ from 0 by at most this number.
+#: The length of a handwritten axis may differ by this number from 1, and its pitch (m/rad) from 0.
 _WRITTEN = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
 class ScrewJoint:
-    """One joint: its name, kind, mimic rule and limits."""
-
     name: str
     kind: JointKind
     mimic: Mimic | None = None
@@ -348,10 +345,9 @@ def screws_from(
 
 
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
-    """Make screws from a file's plain data, with the keys M and space or body; errors as for `screws_from`.
+    """Make screws from a file's plain data, with the keys M and space or body.
 
-    Raises:
-        InputError: the data has an unknown key, or has neither the key space nor the key body.
+    The errors are those of `screws_from`, and InputError for an unknown key or without space and body.
     """
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
     for key in data:

@@ -12,8 +12,8 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: For each format: the module with its function `write_NAME`, and a summary in one line. If the format is a
-#: language of `urdfkin export`, the name of the module is "".
+#: Each format has a summary, and the module of its function `write_NAME`.
+#: The name of the module is "" for a language of `urdfkin export`.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": ("urdfkin.dh.export.text", "aligned text"),
     "markdown": ("urdfkin.dh.export.text", "a Markdown table"),
@@ -35,16 +35,11 @@ FORMATS: dict[str, tuple[str, str]] = {
 
 
 def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
-    """Return the table in a format.
+    """Return the table in a format of `FORMATS`.
 
-    Numeric code computes the placement, the Jacobian and the acceleration of the tip. Like the code from
-    `urdfkin export --form dh`, this code contains a self-test.
-
-    Args:
-        table: Any table.
-        format: A name in `FORMATS`.
-        units: Number format of printed tables; data and code are in metres and radians.
-        verify: Whether Pinocchio checks the exported code.
+    `units` is the number format of printed tables; data and code are in metres and radians. Numeric code
+    computes the placement, the Jacobian and the acceleration of the tip. Like the code from `urdfkin export
+    --form dh`, this code contains a self-test. With `verify`, Pinocchio checks the exported code.
 
     Raises:
         UnknownNameError: an unknown format.

@@ -22,9 +22,8 @@ from urdfkin.model.tree import FloatArray, is_bounded
 def identifier(name: str) -> str:
     """Return a valid name in C, Python and MATLAB.
 
-    Example:
-        >>> identifier("ur5 robot"), identifier("2dof"), identifier("for")
-        ('ur5_robot', 'robot_2dof', 'for_')
+    >>> identifier("ur5 robot"), identifier("2dof"), identifier("for")
+    ('ur5_robot', 'robot_2dof', 'for_')
     """
     word = re.sub(r"[^A-Za-z0-9_]", "_", name) or "robot"
     if not word[0].isalpha():
@@ -83,8 +82,7 @@ def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> lis
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
 
 
-#: Integers below this number are written as integers. Numbers with at most this denominator are written as
-#: fractions. Other numbers are written as decimals.
+#: Integers below this number, and fractions up to this denominator, are exact; other numbers are decimals.
 _LONGEST = 10**9
 
 
@@ -95,34 +93,28 @@ class Fractions(Units):
     """
 
     def length(self, metres: float) -> str:
-        """Format a length or another number."""
         sign, x = "-" if metres < 0.0 else "", Fraction(repr(abs(metres)))
         if x.denominator == 1 and x < _LONGEST:
             return f"{sign}{x}"
         return sign + (self.ratio(x) if x.denominator <= _LONGEST else self.decimal(abs(metres)))
 
     def angle(self, radians: float, pi: str = "pi") -> str:
-        """Format an angle."""
         if (fraction := pi_fraction(radians)) is not None:
             return re.sub(r"(\d)(?=[a-z])", r"\1*", fraction_text(fraction, pi))
         return ("-" if radians < 0.0 else "") + self.decimal(abs(radians))
 
     def ratio(self, x: Fraction) -> str:
-        """Format a fraction."""
         return f"Rational({x.numerator}, {x.denominator})"
 
     def decimal(self, x: float) -> str:
-        """Format any other number."""
         return repr(x)
 
 
 def columns(table: DHTable) -> str:
-    """Return the names of a row's cells."""
     return "a, alpha, d, theta" + (", beta" if table.has_hayati_rows else "")
 
 
 def rows(table: DHTable, number: Fractions, **style: Any) -> list[str]:
-    """Return the cells of each row, separated by commas."""
     return [", ".join(cells(table, row, number, number=number.length, **style)) for row in table.rows]
 
 
