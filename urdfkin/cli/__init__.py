@@ -23,10 +23,9 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: The commands under each heading of the help page: the module of each command, and a summary of one line. In
-#: a module with one command, the command's function is called `command`. In a module with several commands,
-#: the function of the command NAME is called `NAME_command`. `groups` adds the commands of
-#: `verify/quantities.py`, for example `jacobian`, at the top of the heading `_COMPUTE`.
+#: Each command has its module and a summary, under a heading of the help page.
+#: The function of the only command in a module is called `command`; otherwise it is called `NAME_command`.
+#: `groups` adds the commands of `verify/quantities.py`, for example `jacobian`, to the heading `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -117,23 +116,21 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "warm": ("urdfkin.cli.warm", "Compile all kernels in advance, for container images and CI."),
     },
 }
-#: The module that makes a command for each quantity in `verify/quantities.py`, for example `jacobian`.
+#: This module makes a command for each quantity in `verify/quantities.py`.
 _QUANTITY = "urdfkin.cli.quantity"
 
 
 def groups() -> dict[str, dict[str, tuple[str, str]]]:
-    """Return each command's module and summary, grouped by heading of the help page."""
     rows = {name: (_QUANTITY, f"Compute the {row.summary}.") for name, row in by_command().items()}
     return _GROUPS | {_COMPUTE: rows | _GROUPS[_COMPUTE]}
 
 
 def commands() -> dict[str, tuple[str, str]]:
-    """Return each command's module and summary."""
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
-#: For each word that users may type instead of a command: the right command. If the value contains options,
-#: as in "placement --relative-to FRAME", the error message suggests the value.
+#: Users may type these words instead of the command on the right.
+#: The error message suggests the whole value, for example "placement --relative-to FRAME".
 _SYNONYMS = {
     **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
     **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),
@@ -162,7 +159,7 @@ _SYNONYMS = {
     **dict.fromkeys(("equal", "equivalent"), "same"),
     **dict.fromkeys(("list", "catalogue", "catalog"), "robots"),
 }
-#: For each word about a subject that urdfkin does not support: the advice in the error message.
+#: For each word about an unsupported subject, the error message contains this advice.
 _ABSENT = {
     **dict.fromkeys(
         ("ik", "inverse", "inverse-kinematics", "solve"),
@@ -178,10 +175,7 @@ _ABSENT = {
 
 
 def _unknown(name: str) -> UrdfkinError:
-    """Return the error for an unknown command.
-
-    If the word is a common name of an existing command, the error suggests this command.
-    """
+    """Return the error for an unknown command; it suggests an existing command with this meaning."""
     word = name.lower().replace("_", "-")
     if word in commands():
         return UnknownNameError("command", name, [word])
@@ -197,11 +191,9 @@ class LazyGroup(click.Group):
     """A command group that imports a command only when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the command names in the order of the help page."""
         return list(commands())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import one command's module and return the command; None for an unknown name."""
         if (found := commands().get(cmd_name)) is None:
             return None
         module = importlib.import_module(found[0])
@@ -221,18 +213,14 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
-        """Return the commands and options that begin with `incomplete`.
-
-        The modules of the commands are not imported.
-        """
-        from click.shell_completion import CompletionItem  # noqa: PLC0415  only for shell completion
+        """Return the commands and options that begin with `incomplete`, without importing a command."""
+        from click.shell_completion import CompletionItem  # noqa: PLC0415  only completion needs this
 
         found = [(name, summary) for name, (_, summary) in commands().items() if name.startswith(incomplete)]
         names = [CompletionItem(name, help=summary) for name, summary in found]
         return names + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands with their summaries, grouped by heading."""
         width = max(map(len, commands()))
         for heading, entries in groups().items():
             with formatter.section(heading):
@@ -246,7 +234,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version  # noqa: PLC0415
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
-    pinocchio()  # raises an error with the remedy if Pinocchio is not installed
+    pinocchio()  # This call raises an error if Pinocchio is not installed.
     ctx.exit()
 
 
@@ -273,11 +261,11 @@ def main() -> None:
     """
     streams.prepare()
     guard()
-    # For small matrices, one thread of OpenBLAS is fastest. OpenBLAS reads the number of threads when NumPy
-    # imports it.
+    # For small matrices, one thread of OpenBLAS is fastest.
+    # OpenBLAS reads the number of threads when NumPy imports it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if os.environ.get("_URDFKIN_COMPLETE"):  # print no error during shell completion
+    if os.environ.get("_URDFKIN_COMPLETE"):  # Shell completion prints no error.
         sys.stderr = io.StringIO()
-    # Hide this warning: the last line of the output already states that the result was not verified, and why.
+    # The last line of the output already states that the result was not verified, and why.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

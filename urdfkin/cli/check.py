@@ -60,7 +60,6 @@ class Outcome:
     """The results of all files.
 
     Attributes:
-        files: The checked files, by name.
         findings: Findings to print.
         silenced: Pairs of a finding that a comment in the file suppresses, and the reason in this comment.
         excerpts: For each finding, the line of the file, and a second line with a caret under the fault.
@@ -85,7 +84,6 @@ class Outcome:
     unsafe: int = 0
 
     def add(self, file: str, found: Examined) -> None:
-        """Add the result of checking one file."""
         excerpts = Excerpts(found.data)
         self.files.append(file)
         self.findings += found.findings
@@ -94,7 +92,6 @@ class Outcome:
 
 
 def print_outcome(outcome: Outcome, style: str, *, statistics: bool) -> None:
-    """Print all findings in one format."""
     findings, version = outcome.findings, installed_version("urdfkin") or "0+unknown"
     if style == "json":
         click.echo(as_json(findings, outcome.files, version, outcome.silenced))
@@ -151,7 +148,6 @@ def _print_statistics(outcome: Outcome) -> None:
 
 
 def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
-    """Print one line for each code that was fixed in a file."""
     for code in sorted({finding.code for finding in fixed}):
         these = [finding for finding in fixed if finding.code == code]
         turns = max(finding.fix.turns for finding in these if finding.fix)
@@ -163,12 +159,11 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
 
 
 def difference(file: str, before: bytes, after: bytes) -> str:
-    """Return the changes that the fixes have made, as a patch."""
     return patch(file, before, after, harmless)
 
 
 _SETTINGS = "urdfkin.settings"
-#: The settings in pyproject.toml that set the default of an option of the same name.
+#: These settings in pyproject.toml are the defaults of the options with the same names.
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
@@ -235,7 +230,7 @@ settings_options = together(
         help="File with a table [tool.urdfkin] of settings.  [default: nearest pyproject.toml]",
     ),
 )  # fmt: skip
-#: The help texts of the options --max-bytes, --max-depth and so on, by field of `Limits`.
+#: Help texts of --max-bytes, --max-depth, ...
 _MOST = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",
@@ -397,12 +392,10 @@ class Run:
         choice: Selects the findings to report.
         strict: Whether warnings become errors.
         fold: Whether to merge findings with the same code into one line of output.
-        fix: Whether to apply fixes.
         diff: Whether to collect the changes that the fixes would make, as patches.
         unsafe: Whether the user gave --unsafe-fixes.
         version: The version that --changed-since names, or None.
         accepting: Whether the user gave --write-baseline, so that all findings are accepted.
-        outcome: The results so far.
     """
 
     look: partial[Examined]
@@ -457,9 +450,7 @@ class Run:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_other(self, file: str) -> None:
-        """Check a USD or MJCF file.
-
-        If `load` rejects the robot, add the findings of its error.
+        """Check a USD or MJCF file; if `load` rejects the robot, add the findings of its error.
 
         With --changed-since, an unchanged file is skipped, and all findings of a changed file are reported.
         """
@@ -468,7 +459,7 @@ class Run:
         ):
             self.outcome.unchanged += 1
             return
-        from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
+        from urdfkin.robot.loading import load  # noqa: PLC0415  --help stays fast
 
         how = how_to_load()
         with warnings.catch_warnings():
@@ -528,7 +519,7 @@ class Run:
         return lambda finding: chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
 
     def _with_severity(self, finding: Finding) -> Finding:
-        # Do not apply --strict for --write-baseline: a baseline file stores each finding's original severity.
+        # A baseline file stores each finding's original severity.
         raised = self.strict and not self.accepting and finding.severity is Severity.WARNING
         return replace(finding, severity=Severity.ERROR) if raised else finding
 
@@ -539,7 +530,7 @@ class Run:
         return 2 if self.outcome.unreadable else int(bad)
 
 
-#: Suffixes of MJCF files and of the files that they include.
+#: Suffixes of MJCF files and includes
 _MJCF = (".xml", ".mjcf")
 
 
@@ -551,8 +542,8 @@ def _is_other(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            return False  # without the next import, which loads NumPy
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  slow, and not needed for a URDF
+            return False  # The next import loads NumPy.
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  this import is slow, and a URDF does not need it
 
     return is_mjcf(file)
 

@@ -38,25 +38,22 @@ from urdfkin.system.files import at_home
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
-#: Formats that can contain several tables.
+#: Formats for several tables
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: In these formats, the check's result is printed below the table. With other formats, the result of the
-#: check goes to stderr.
+#: In these formats, the check's result is printed below the table; otherwise it goes to stderr.
 _PRINTED = ("terminal", "markdown")
-#: Formats for people. All other formats are for data and code.
+#: Formats for people
 _TEXTS = (*_PRINTED, "html", "latex")
-#: For each format that rounds numbers: the number of digits in the base and tool transforms. None: --digits.
+#: Digits of base and tool in formats that round numbers are --digits, or the given number.
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """The command's options.
+    """The command's options; `choices` are other arguments of `Robot.dh`.
 
-    Attributes:
-        written: File of the table, if ROBOT is a table that the command writes unchanged. None: the command
-            derives a table from the robot.
-        choices: Other arguments of `Robot.dh`.
+    `written` is the file of the table, if ROBOT is a table that the command writes unchanged. If `written` is
+    None, the command derives a table from the robot.
     """
 
     robot: Robot
@@ -80,7 +77,6 @@ class Work:
 
     @property
     def units(self) -> Units:
-        """Number format of the options."""
         return Units(
             Angles.DEGREES if self.degrees else Angles.RADIANS,
             Lengths.MILLIMETRES if self.millimetres else Lengths.METRES,
@@ -90,7 +86,6 @@ class Work:
 
 
 def run(work: Work) -> Answer:
-    """Return the result of `urdfkin dh`."""
     chosen = [
         name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
     ]
@@ -143,7 +138,7 @@ def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
     if work.written is not None:
         table = read_table_or_screws(at_home(work.written))
-        # `Robot.dh` derives a table from screws in the same way as from a URDF
+        # `Robot.dh` derives a table from screws in the same way as from a URDF.
         if isinstance(table, DHTable):
             return to_convention(table, work.convention or table.convention)
     like = None
@@ -170,7 +165,7 @@ def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:
     if work.format_ == "urdf":
         return to_urdf(table)
     if work.format_ == "svg":
-        from urdfkin.view.dh_drawing import drawing  # noqa: PLC0415  needs an extra
+        from urdfkin.view.dh_drawing import drawing  # noqa: PLC0415  this module needs an extra
 
         return drawing(table)
     text = export(table, work.format_, work.units, verify=bool(work.robot.verifier.policy))
@@ -261,7 +256,6 @@ def _compare(work: Work, name: str) -> Answer:
 
 
 def _frame_of_robot(work: Work, name: object) -> str | None:
-    """Return `name` if it is the name of a frame of the robot; otherwise None."""
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
 

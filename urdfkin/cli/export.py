@@ -1,7 +1,4 @@
-"""`urdfkin export`: write a frame's kinematics as code.
-
-The same file contains test vectors and their bounds.
-"""
+"""`urdfkin export`: write a frame's kinematics as code, with test vectors and their bounds."""
 
 from __future__ import annotations
 
@@ -92,7 +89,7 @@ def command(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
         context.exit(_check(file))
-    from urdfkin.export import code_in, write  # noqa: PLC0415  keeps --help fast
+    from urdfkin.export import code_in, write  # noqa: PLC0415  --help stays fast
     from urdfkin.export.forms import code_of_robot  # noqa: PLC0415
 
     assert robot is not None

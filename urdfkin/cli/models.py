@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
-#: Options of `urdfkin same` that need exactly two robots.
+#: These options of `urdfkin same` need exactly two robots.
 _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
 
 
@@ -95,11 +95,10 @@ def same_command(
 
     Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
     --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are
-    compared as written. Exit 0:
-    all frames stay within the given distance. 1: a frame does not.
+    compared as written. Exit 0: all frames stay within the given distance. 1: a frame does not.
     """
     if schema:
-        from urdfkin.comparison.certificate import SAME  # noqa: PLC0415  keeps --help fast
+        from urdfkin.comparison.certificate import SAME  # noqa: PLC0415  --help stays fast
 
         click.echo(SAME.schema_text(), nl=False)
         click.get_current_context().exit()
@@ -142,8 +141,7 @@ def same_command(
 
 
 def _all_pairs(sources: tuple[str, ...], within: float | None, *, strict: bool, boxes: int | None) -> Answer:
-    """Compare each pair of several robots, such as the URDF, the MJCF and the USD of one robot."""
-    from itertools import combinations  # noqa: PLC0415  keeps --help fast
+    from itertools import combinations  # noqa: PLC0415  --help stays fast
 
     robots = load_several(*sources)
     with compiling():
@@ -171,7 +169,7 @@ def _all_pairs(sources: tuple[str, ...], within: float | None, *, strict: bool, 
 
 
 def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
-    from urdfkin.comparison.certificate import SAME, recheck, words_of  # noqa: PLC0415  keeps --help fast
+    from urdfkin.comparison.certificate import SAME, recheck, words_of  # noqa: PLC0415  --help stays fast
 
     certificate = SAME.read(path)
     errors = recheck(certificate, *robots)
@@ -207,7 +205,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """
-    from itertools import combinations  # noqa: PLC0415  keeps --help fast
+    from itertools import combinations  # noqa: PLC0415  --help stays fast
 
     from urdfkin.comparison.diff import diff  # noqa: PLC0415
     from urdfkin.report.diff import (  # noqa: PLC0415

@@ -42,7 +42,7 @@ def command(robot: str, start: str | None, end: str | None) -> Answer:
 
 
 def _table(robot: Robot) -> Answer:
-    from urdfkin.model.conventions import BUILT_IN, find_convention  # noqa: PLC0415  keeps --help fast
+    from urdfkin.model.conventions import BUILT_IN, find_convention  # noqa: PLC0415  --help stays fast
 
     found = {name: robot.convention(name) for name in BUILT_IN if find_convention(name).order != "given"}
     cells = {name: _cells(robot, conversion) for name, conversion in found.items()}

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.robot.trajectory import Trajectory
 
-#: These names are copied from `urdfkin.view.plot`, because importing that module would slow --help down.
+#: The names are copied from `urdfkin.view.plot`, whose import would slow --help down.
 PANELS = (
     *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
     *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
@@ -115,7 +115,7 @@ def command(
     if (trajectory is None) == (end is None):
         raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
     from urdfkin.robot.frame_motion import frame_motion  # noqa: PLC0415
-    from urdfkin.view.figure import save  # noqa: PLC0415  keeps --help fast
+    from urdfkin.view.figure import save  # noqa: PLC0415  --help stays fast
     from urdfkin.view.plot import foot, sheet  # noqa: PLC0415
 
     check_writable(output)

@@ -1,7 +1,6 @@
 """Commands that compute a quantity of a frame, such as `urdfkin jacobian`, `placement` and `imu`.
 
-`verify/quantities.py` lists the quantities, and each quantity has a command. All these commands have the same
-options, input formats and output formats.
+Each quantity of `verify/quantities.py` has a command, and all have the same options and formats.
 """
 
 from __future__ import annotations
@@ -68,7 +67,7 @@ _BASE = ("base_placement", "base_velocity", "base_acceleration")
 _trajectory = trajectory_option(
     "Read q, v and a from a file instead of --q, --v and --a. CSV output has a row for each time."
 )
-#: Largest number of samples that the terminal output shows as tables.
+#: The terminal shows tables of at most this number of samples.
 _SHOWN = 5
 
 
@@ -85,13 +84,12 @@ def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Cal
 
 
 def _load() -> Robot:
-    """Load the robot of the running command."""
     options = click.get_current_context().params
     return load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
 
 
 def _read() -> Inputs:
-    """Load the robot of the running command. Read q, v and a, or --trajectory. Read the --base options."""
+    """Load the robot of the command; read q, v and a or --trajectory, and the --base options."""
     options = click.get_current_context().params
     values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
     robot = _load()
@@ -107,7 +105,7 @@ def _along(
     robot: Robot, frame: str | None, path: Path, letters: str, conversion: Conversion | None
 ) -> Inputs:
     """Read the samples of a trajectory; compute v and a by differences only if the command needs them."""
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     from urdfkin.robot.trajectory import read_samples, with_rates  # noqa: PLC0415
 
@@ -165,7 +163,6 @@ _breakdown = click.option(
 
 
 def command_of(quantity: Quantity) -> click.Command:
-    """Make the command that computes a quantity."""
     has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --breakdown"
 
     own = [reference_option] if quantity.referred else []
@@ -243,8 +240,8 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.columns and not x.along:
         rates = [csv_cell(name) for name in x.rate_names]
-        # The CSV of a Hessian has one line for each entry of the Jacobian. Each line lists the derivatives of
-        # this entry with respect to each joint.
+        # The CSV of a Hessian has one line for each entry of the Jacobian.
+        # Each line lists the derivatives of this entry with respect to each joint.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -261,7 +258,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Heading of the first CSV column: "t" if the samples have times, otherwise "sample".
+#: The first CSV column is "t" if the samples have times, otherwise "sample".
 _TIME = ("sample", "t")
 
 
@@ -271,14 +268,13 @@ def _times(x: Inputs) -> Iterable[object]:
 
 
 def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
-    """Return the table of one sample."""
     if quantity.columns:
         return _columns(quantity, x.rate_names, value)
     if not quantity.units:
         relative_to = x.said.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    if len(value) != 3 * len(quantity.units):  # a quaternion
+    if len(value) != 3 * len(quantity.units):  # a position and a quaternion
         return Table(quantity.labels, [value.tolist()], left=0)
     names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
     rows = zip(names, value.reshape(-1, 3).tolist(), strict=True)
@@ -290,7 +286,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
     For a Hessian, the table has one row for each pair of entries of v whose derivatives are not all zero.
     """
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     if quantity.axes == len(("row", "rate")):
         return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
@@ -308,7 +304,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 
     Pinocchio checks the sum of the contributions, which is the acceleration.
     """
-    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
+    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  --help stays fast
 
     def parts() -> Iterator[str | Table]:
         yield "m/s^2, rad/s^2; terms (7.125): transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z"
@@ -319,7 +315,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
                 continue
             noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
             rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
-            # Print four digits, so that a row fits on the terminal.
+            # With four digits, a row fits on the terminal.
             cells = [
                 (*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows
             ]
@@ -354,7 +350,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 # -- commands with options of their own --------------------------------------------------------------
 
 _POSITION = ("x", "y", "z")
-#: The choices of `placement --as`, except the matrix.
+#: Choices of `placement --as` besides the matrix
 _FORMS = {
     "rpy": replace(
         PLACEMENT,
@@ -421,7 +417,7 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
     If Pinocchio has checked the poses, Pinocchio also checks these positions and orientations.
     """
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
 
@@ -447,7 +443,7 @@ def _again(x: Inputs, k: int, written: str) -> str:
     return f"{line} --as {written}"
 
 
-#: Copied from `urdfkin.kinematics.rotation.SEQUENCES`, because importing that module would slow --help down.
+#: This is a copy of `urdfkin.kinematics.rotation.SEQUENCES`, whose import would slow --help down.
 _TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
@@ -480,7 +476,7 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     rates of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity. `urdfkin
     jacobian` prints angular velocities instead.
     """
-    from urdfkin.kinematics.rotation import NEAREST  # noqa: PLC0415  keeps --help fast
+    from urdfkin.kinematics.rotation import NEAREST  # noqa: PLC0415  --help stays fast
 
     x, nearest = _read(), NEAREST if nearest is None else nearest
     with compiling():
@@ -526,7 +522,7 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
     explain gravity-in-an-acceleration`.
     """
-    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415  --help stays fast
 
     x = _read()
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
@@ -585,7 +581,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
                 yield Table(("", "value", "no less than", "no more than"), lines)
                 if singularity := found.singularity(k):
                     yield from str(singularity).splitlines()
-                    continue  # the manipulability has no derivative
+                    continue  # The manipulability has no derivative.
                 slopes = zip(x.rate_names, gradient[k].tolist(), strict=True)
                 yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
 

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
 
-#: The paths and contents of the files of a report in one format. Most formats have one file; an HTML report
-#: can have a page and a folder of other files.
+#: These are the paths and contents of the files of a report in one format.
+#: An HTML report can have a page and a folder of other files.
 Files = Iterator[tuple[Path, bytes]]
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
 
-#: The options that name an output file of a report, as names of parameters.
+#: These options name an output file of a report.
 FILES = ("json_", "html", "junit", "markdown")
 report_options = together(
     click.option("--html", type=_PATH, help="Write the report as an HTML page that works offline."),
@@ -45,8 +45,8 @@ report_options = together(
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
     """Write a report in the requested formats; if one file cannot be written, write the others.
 
-    Returns:
-        0, or the exit code of the first format that could not be written. Its error has been printed.
+    The result is 0, or the exit code of the first format that could not be written. Its error has been
+    printed.
     """
     forms = {"json_": _json, "html": _html, "junit": _junit, "markdown": _markdown}
     codes = (_write(path, forms[name], document) for name in FILES if (path := files[name]) is not None)
@@ -54,7 +54,6 @@ def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
 
 
 def say_written(files: Mapping[str, Path | None]) -> None:
-    """Print the names of the written files, if any."""
     if named := [str(files[name]) for name in FILES if files[name]]:
         say(f"wrote {', '.join(named)}")
 
@@ -79,7 +78,7 @@ def _json(document: Document, path: Path) -> Files:
 
 
 def _html(document: Document, path: Path) -> Files:
-    from urdfkin.report.html import as_files  # noqa: PLC0415  draws plots
+    from urdfkin.report.html import as_files  # noqa: PLC0415  this module draws plots
 
     return ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
 
@@ -103,7 +102,6 @@ class _Results(click.Group):
     """The subcommands of `report`. Without a subcommand, `report FILE` means `report show FILE`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Insert `show` unless a subcommand or help is asked for."""
         if not ctx.resilient_parsing and (not args or args[0] not in (*self.commands, "-h", "--help")):
             args = ["show", *args]
         return super().parse_args(ctx, args)
@@ -136,7 +134,7 @@ def show(
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
-    from urdfkin.validation.document import VALIDATION, outcome_of  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.document import VALIDATION, outcome_of  # noqa: PLC0415  --help stays fast
 
     if schema:
         click.echo(VALIDATION.schema_text(), nl=False)
@@ -183,8 +181,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     compared on fewer samples. A bound is wider. A worst disagreement grew by more than the factor and is
     above 2 eps*scale. A changed model is listed joint by joint. A changed model alone is not a regression;
     `same` and `diff` compute how far its frames move. If a report contradicts itself, for example in its
-    numbers of samples, the command exits with 2.
-    Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
+    numbers of samples, the command exits with 2. Exit 0: no regression. 1: a regression. 2: a file that
+    cannot be used.
     """
     from urdfkin.report.compare import compare, document, markdown_of  # noqa: PLC0415
     from urdfkin.report.reading import read_document  # noqa: PLC0415
@@ -219,8 +217,8 @@ def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
     If a file was renamed, the command uses the robot's name. Changes and regressions are defined as in
     `report compare`. With `--output history.html`, the command writes an offline page with charts.
 
-    If a file cannot be used, the command prints its name and the reason, and shows the other files.
-    Exit 0: every file was used. 2: a file cannot be used.
+    If a file cannot be used, the command prints its name and the reason, and shows the other files. Exit 0:
+    every file was used. 2: a file cannot be used.
     """
     from urdfkin.report.history import HISTORY, as_html, document, history  # noqa: PLC0415
 

@@ -62,7 +62,7 @@ def write_command(
     spatial acceleration. The files contain the placement once, and each other quantity in the frames LOCAL,
     WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and --samples.
     """
-    from urdfkin.validation import vectors  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation import vectors  # noqa: PLC0415  --help stays fast
 
     if schema:
         click.echo(vectors.VECTORS.schema_text(), nl=False)

@@ -301,7 +301,7 @@ class SnapReport:
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
 
 
-#: A rotation in a handwritten pose often has only seven digits.
+#: A rotation in a handwritten pose may have this error, because it often has only seven digits.
 _TYPED = 1e-6
 
 

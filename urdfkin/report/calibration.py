@@ -20,7 +20,6 @@ _ROUNDING = 0.5
 
 
 def document(found: Calibration) -> TextDocument:
-    """Return a calibration: parameters, errors, noise, base, tool and warnings."""
     model, identification = found.model, found.identification
     poses = f", {counted(len(found.fitted.errors), 'pose')}" if found.fitted is not None else ""
     title = f"{found.robot.name}: {model.base} to {model.tip}{poses}"
@@ -83,7 +82,6 @@ def document(found: Calibration) -> TextDocument:
 
 
 def moved_table(written: Rewritten) -> Table:
-    """Return a table with the distance and the angle by which each joint's origin changed."""
     rows = [(joint, length(shift), angle(turn)) for joint, (shift, turn) in written.moved.items()]
     return Table(["joint", "origin moved by", "rotated by"], rows)
 
@@ -105,7 +103,6 @@ def _written(T: FloatArray) -> str:
 
 
 def as_data(found: Calibration) -> dict[str, Any]:
-    """Return the calibration as JSON data; null for unknown values."""
     identification = found.identification
     data: dict[str, Any] = {
         "robot": found.robot.name,

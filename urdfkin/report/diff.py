@@ -13,15 +13,12 @@ from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import counted
 
-#: Titles of the columns.
+#: Titles of the columns
 HEADS = ("element", "what", "old", "new", "alone")
 
 
 def headline(found: Changes) -> str:
-    """Return one line about all changes.
-
-    The text has the number of changes, and the distance by which all changes together move a frame.
-    """
+    """Return the number of changes, and the distance by which all together move a frame."""
     rounding = ""
     if found.rounding is not None:
         metres, radians = found.rounding
@@ -42,7 +39,7 @@ def _by_element(found: Changes) -> dict[str, list[Change]]:
     return grouped
 
 
-#: Columns of the table of several pairs.
+#: Columns of the table of pairs
 PAIRS = ("old", "new", "changes")
 
 
@@ -55,7 +52,6 @@ def pairs_document(found: Sequence[Changes]) -> TextDocument:
 
 
 def pairs_markdown(found: Sequence[Changes]) -> str:
-    """Return the table of all pairs, and a table of the changes of each pair, as Markdown."""
     lines = [f"| {' | '.join(PAIRS)} |", f"|{' --- |' * len(PAIRS)}"]
     lines += [f"| {' | '.join(map(text, (*one.sources, headline(one))))} |" for one in found]
     parts = ["\n".join([*lines, ""])]
@@ -74,7 +70,6 @@ def lines_of(found: Changes) -> list[str]:
 
 
 def document(found: Changes) -> TextDocument:
-    """Return the changes as a table."""
     parts: list[str | Table] = [f"{found.sources[0]} \u2192 {found.sources[1]}"]
     parts += [Table(HEADS, rows_of(found), left=len(HEADS))] if found else []
     return TextDocument(headline(found), parts)

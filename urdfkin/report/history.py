@@ -2,8 +2,7 @@
 
 Runs are ordered by their start. Robots in two reports are matched by their source. If a file was renamed, its
 robot is matched by the robot's name, as in `compare`. Each report is read twice, first for its start time and
-then for its results, so that only one report at a time is in memory. A report that cannot be used is listed
-with the reason; the others are shown.
+then for its results, so that only one report at a time is in memory.
 """
 
 from __future__ import annotations
@@ -30,17 +29,17 @@ from urdfkin.validation.document import VALIDATION, Document, Robot, Units
 from urdfkin.validation.outcome import OUTCOMES
 from urdfkin.verify.oracles import versions
 
-#: Largest number of reports in a history, and largest number of files in a folder.
+#: A history has at most `MOST_RUNS` reports, and a folder at most `MOST_FILES` files.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: On a terminal, each robot has marks for the latest `MARKED` runs. On the page, the charts show the latest
-#: `CHARTED` runs.
+#: On a terminal, each robot has marks for the latest `MARKED` runs.
+#: On the page, the charts show the latest `CHARTED` runs.
 MARKED, CHARTED = 20, 60
-#: Number of latest changes that are shown without --all, and for each robot on the page.
+#: This number of latest changes is shown without --all, and for each robot on the page.
 SHOWN = 20
 _LISTED = 500
-#: A mark for each verdict.
+#: Mark of each verdict
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: Lower end of the axis in the chart of disagreements: 10^-3 times the bound.
+#: The axis of the chart of disagreements begins at 10^-3 times the bound.
 _LOWEST = -3.0
 
 
@@ -107,7 +106,7 @@ class HistoryDocument(Header):
     repeated: Annotated[list[Unused], says("Files that repeat a validation run of another file.")]
 
 
-#: The layout of the document.
+#: Layout of the document
 HISTORY = Layout(
     "urdfkin-history/1",
     HistoryDocument,
@@ -116,7 +115,7 @@ HISTORY = Layout(
 )
 
 
-#: The changes of each source, with their runs.
+#: Changes of each source, with their runs
 Told = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
@@ -139,7 +138,6 @@ class History:
 
     @property
     def exit_code(self) -> int:
-        """The exit code: 0 if every file was used, otherwise 2."""
         return 2 if self.unusable else 0
 
     def as_dict(self, command: str | None = None) -> HistoryDocument:
@@ -163,14 +161,8 @@ class History:
 def history(paths: Sequence[Path]) -> History:
     """Read reports and return their history.
 
-    Args:
-        paths: JSON files of `urdfkin validate --json`, stores, and folders with such files and stores.
-
-    Returns:
-        The runs in the order of their start, and the results of each robot in each run.
-
-    Raises:
-        InputError: No report can be used, or there are too many reports.
+    The paths are JSON files of `urdfkin validate --json`, stores, and folders with such files and stores.
+    InputError is raised if no report can be used, or if there are too many reports.
     """
     found = History()
     before: Document | None = None
@@ -196,10 +188,7 @@ def _rank(found: History, points: Sequence[Point]) -> tuple[bool, int]:
 
 
 def _files(paths: Sequence[Path]) -> Iterator[Path]:
-    """Yield the path of each report, which is a file or a store.
-
-    A folder contributes all its files with the suffix .json, at any depth.
-    """
+    """Yield the path of each file or store; a folder contributes its files *.json at any depth."""
     count = 0
     for path in paths:
         inside = _in_folder(path) if is_folder(path) and not _is_store(path) else iter([path])
@@ -336,12 +325,7 @@ def _point(run: int, source: str, robot: Robot) -> Point:
 
 
 def document(found: History, *, all_: bool = False) -> TextDocument:
-    """Return the history for a terminal: runs, robots, and the latest changes.
-
-    Args:
-        found: The history.
-        all_: Whether to show all runs and changes, not only the latest.
-    """
+    """Return the history for a terminal; with `all_`, show all runs and changes, not only the latest."""
     some = None if all_ else SHOWN
     first = 0 if all_ else max(0, len(found.runs) - SHOWN)
     runs = [
@@ -426,7 +410,6 @@ def _of(told: Told, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
 
 
 def words_of(change: ChangeEntry) -> str:
-    """Return a change in one line."""
     words = str(Change(**change))
     return f"REGRESSION {words}" if change["regression"] else words
 

@@ -34,7 +34,6 @@ def print_named(
     *,
     left: Collection[int] = (0,),
 ) -> None:
-    """Print a table with the given columns and rows; the columns in `left` are left-aligned."""
     print_table(out, Table(columns, list(rows), left))
 
 
@@ -76,10 +75,7 @@ def print_table(out: Console, table: Table) -> None:
 
 
 def fits(out: Console, table: Table) -> bool:
-    """Whether a table fits the width of the terminal.
-
-    Two columns are separated by two spaces, and one space follows the last column.
-    """
+    """Whether a table fits the terminal; two spaces separate columns, and one follows the last column."""
     return sum(width + 2 for width in _cells(table)[2]) - 1 <= out.width
 
 

@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
 
 class Cell:
-    """The 3D view that `Robot.view` returns in a notebook.
-
-    Args:
-        robot: The robot.
-        q: (nq,) configuration at the start.
-        height: Height in pixels.
-    """
+    """The 3D view that `Robot.view` returns in a notebook: `q` (nq,) at the start, `height` in pixels."""
 
     def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
         self._name, self._height = robot.name, height
@@ -33,7 +27,6 @@ class Cell:
         return log_line(f"<a view of {self._name}, which is displayed as the last line of a notebook cell>")
 
     def page(self) -> str:
-        """Return the HTML page."""
         data: dict[str, Any] = {"source": self._name, "joints": moving_names(self._description), "chains": []}
         return (
             environment()

@@ -32,21 +32,18 @@ if TYPE_CHECKING:
 
 _READABLE = DisplayUnits(digits=6)
 
-#: Upper edges of the heat map's colour steps, as ratios of a disagreement to its bound. A result above the
-#: last edge is outside its bound.
+#: These ratios of a disagreement to its bound are the upper edges of the heat map's colour steps.
+#: A result above the last edge is outside its bound.
 HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A cell of the heat map: its text and its colour step."""
-
     text: str
     step: int
 
 
 def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
-    """Return a row of the overview table, with sort keys."""
     checks = robot["checks"]
     largest, share = worst(check["worst"] for check in checks), share_of(robot)
     return {
@@ -70,7 +67,7 @@ def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, 
 
 
 def reason(robot: Robot) -> str:
-    """Return the reason of a verdict. Omit errors of the file, which the page lists below as findings."""
+    """Return the reason of a verdict without the errors of the file, which the page lists as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -196,7 +193,7 @@ def _share(check: Check, subject: int) -> float:
     is the largest ratio in the whole check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
-    if not value:  # a disagreement of 0 lies within every bound
+    if not value:  # A disagreement of 0 lies within every bound.
         return math.inf if value is None else 0.0
     if not tightest:
         return math.inf
@@ -213,7 +210,6 @@ def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
 
 
 def has_beta(chain: Chain) -> bool:
-    """Whether the standard or the modified table has a Hayati row."""
     return any(row["beta"] != 0.0 for key in ("standard", "modified") for row in _rows(chain, key))
 
 
@@ -244,7 +240,6 @@ def _plus(constant: str, variable: str) -> str:
 
 
 def metres(value: float) -> str:
-    """Format a length in metres."""
     return _READABLE.length(value).replace("-", "−")
 
 
@@ -254,10 +249,6 @@ def angle(value: float) -> str:
 
 
 def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
-    """Return the rows of the accuracy study.
-
-    A row has the errors of urdfkin and of Pinocchio, and the more accurate of the two.
-    """
     return [
         {
             "quantity": quantity_name(line["quantity"]),
@@ -272,7 +263,6 @@ def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
 
 
 def check_rows(robot: Robot) -> list[dict[str, Any]]:
-    """Return the rows of the checks, with numbers as text."""
     return [
         {
             "quantity": quantity_name(check["quantity"]),
@@ -294,7 +284,7 @@ def check_rows(robot: Robot) -> list[dict[str, Any]]:
 
 
 def failures(robot: Robot) -> list[dict[str, Any]]:
-    """Return the rows of the failed checks. The largest ratio of a disagreement to its bound comes first."""
+    """Return the rows of the failed checks, the largest ratio of a disagreement to its bound first."""
     failing = sorted(
         (check for check in robot["checks"] if check["failed"]),
         key=lambda check: -_sortable(check["share_of_bound"]),

@@ -39,17 +39,14 @@ from urdfkin.validation.document import Check, Document, Judgement, Robot, outco
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: Minimum width of a terminal for a table with a column for each quantity.
+#: A terminal of this width shows a table with a column for each quantity.
 _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
-    """Print a report.
+    """Print a report; the width of the console determines the layout.
 
-    Args:
-        document: The report's data.
-        out: The console. Its width determines the layout.
-        cases: Whether to show the command that computes each worst case again. Failures always show it.
+    With `cases`, the command that computes each worst case again is shown. Failures always show it.
     """
     robots = document["robots"]
     out.print(
@@ -108,7 +105,6 @@ def _print_robots(robots: Sequence[Robot], out: Console) -> None:
 
 
 def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
-    """Print one row for each quantity, over all robots."""
     rows = []
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name)]
@@ -123,7 +119,6 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
 
 
 def _three_sides(robots: Sequence[Robot], title: str) -> Table:
-    """Return one row for each quantity, over all robots and reference frames."""
     rows = ([quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title))
     heads = [head.replace(", ", ",\n") for head in second_oracle_heads(title)]
     return Table(["quantity", *heads], list(rows), left=(0, 5))
@@ -138,7 +133,6 @@ def _figures(checks: Sequence[Check]) -> list[str]:
 
 
 def _print_checks(robot: Robot, out: Console) -> None:
-    """Print the checks of one robot: a row for each quantity and reference frame."""
     heads = ["quantity, reference", "results", "outside", "median", "99 %", "worst", "of bound"]
     rows = (
         [
@@ -157,10 +151,7 @@ def _print_checks(robot: Robot, out: Console) -> None:
 
 
 def _judged(judgement: Judgement) -> Table:
-    """Return the errors of urdfkin and Pinocchio in the accuracy study.
-
-    The table has a row for each quantity and reference frame.
-    """
+    """Return the errors of the accuracy study, with a row for each quantity and reference frame."""
     heads = [
         "quantity, reference",
         "numbers",

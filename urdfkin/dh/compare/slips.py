@@ -271,7 +271,7 @@ def _row(row: Mapping[str, Any] | Sequence[Any]) -> dict[str, Any]:
     return {key: value for key, value in named.items() if key in _CELLS}
 
 
-#: Plausible lengths (metres) of an arm
+#: Plausible lengths of an arm (metres)
 _LONGEST, _SHORTEST = 20.0, 1e-3
 
 
