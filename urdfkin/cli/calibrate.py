@@ -247,12 +247,7 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
     """Apply a factory calibration; print the difference that the two values of --order make."""
-    from urdfkin.calibration.universal_robots import (  # noqa: PLC0415
-        ORDERS,
-        distance,
-        read_calibration,
-        universal_robots,
-    )
+    from urdfkin.calibration.universal_robots import ORDERS, distance, read_calibration, universal_robots  # noqa: PLC0415
     from urdfkin.comparison.result import angle, length  # noqa: PLC0415
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))

@@ -263,9 +263,7 @@ limit_options = together(
 @click.option("--output", "-o", type=_FILE, help="Write the findings, or the patch of --diff, to this file.")
 @click.option("--fix", is_flag=True, help="Apply the automatic fixes to the files.")
 @click.option(
-    "--unsafe-fixes",
-    is_flag=True,
-    help="Also apply fixes that rotate a joint by more than a rounding error.",
+    "--unsafe-fixes", is_flag=True, help="Also apply fixes that rotate a joint by more than a rounding error."
 )
 @click.option("--diff", is_flag=True, help="Print the changes of --fix as a patch, without applying them.")
 @click.option("--statistics", is_flag=True, help="Print the number of findings of each code.")
@@ -423,10 +421,7 @@ class Run:
             if file not in self._taken:
                 self._taken.add(file)
                 try:
-                    if file not in (
-                        word,
-                        f"./{word}",
-                    ):  # found in a folder, not named by the user
+                    if file not in (word, f"./{word}"):  # The file was found in a folder.
                         demand_regular(Path(file))
                     self._check(file)
                 except UrdfkinError as error:

@@ -175,11 +175,7 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
         (("tip", "like"), options["all_"], "with --all"),
         (_SIGNS, options["like"] is not None, "with --like"),
         (("columns",), tree or compares, "unless the output is one table"),
-        (
-            _UNITS,
-            form not in written,
-            f"in the format {form!r}, which is exact, in metres and radians",
-        ),
+        (_UNITS, form not in written, f"in the format {form!r}, which is exact, in metres and radians"),
         (("mimic", "root_joint", "xacro_arg"), is_table, "for a robot from a table"),
     ):
         if where:

@@ -188,9 +188,7 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @click.argument("b", metavar="NEW", shell_complete=complete_robot)
 @click.argument("more", metavar="[C]...", nargs=-1, shell_complete=complete_robot)
 @click.option(
-    "--effects/--no-effects",
-    default=True,
-    help="Compute how far each change can move the frames (default).",
+    "--effects/--no-effects", default=True, help="Compute how far each change can move the frames (default)."
 )
 @click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
 @source_options

@@ -294,10 +294,7 @@ _VALUES = (
 )
 q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
 v_option = click.option(
-    "--v",
-    metavar="VALUES",
-    default="neutral",
-    help="Joint velocities, written like --q; `neutral` is zero.",
+    "--v", metavar="VALUES", default="neutral", help="Joint velocities, written like --q; `neutral` is zero."
 )
 a_option = click.option(
     "--a",
@@ -327,10 +324,7 @@ def trajectory_option(help_: str) -> Callable[[_F], _F]:
         " or .npz with the arrays t, q, v and a"
     )
     return click.option(
-        "--trajectory",
-        type=click.Path(path_type=Path),
-        metavar="FILE",
-        help=f"{help_} File: {files}.",
+        "--trajectory", type=click.Path(path_type=Path), metavar="FILE", help=f"{help_} File: {files}."
     )
 
 

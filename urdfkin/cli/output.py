@@ -152,12 +152,7 @@ def format_option(
 ) -> Callable[[Any], Any]:
     """Make the option --format; the first format is the default."""
     return click.option(
-        "--format",
-        "format_",
-        type=click.Choice(names),
-        default=names[0],
-        show_default=True,
-        help=help_,
+        "--format", "format_", type=click.Choice(names), default=names[0], show_default=True, help=help_
     )
 
 

@@ -132,13 +132,7 @@ def command(
 
 
 def _line(
-    robot: Robot,
-    start: str,
-    end: str,
-    duration: float,
-    samples: int,
-    seed: int,
-    convention: str | None,
+    robot: Robot, start: str, end: str, duration: float, samples: int, seed: int, convention: str | None
 ) -> Trajectory:
     from urdfkin.cli.options import read_inputs  # noqa: PLC0415
     from urdfkin.robot.trajectory import line  # noqa: PLC0415

@@ -134,10 +134,7 @@ def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], 
     if x.conversion is not None:
         check += f", before the conversion to {x.conversion.convention.name}"
     return Answer(
-        lambda: TextDocument(f"{x.robot.name}: {title}", list(parts())),
-        data,
-        check,
-        exit_code(certificate),
+        lambda: TextDocument(f"{x.robot.name}: {title}", list(parts())), data, check, exit_code(certificate)
     )
 
 

@@ -108,10 +108,7 @@ class HistoryDocument(Header):
 
 #: Layout of the document
 HISTORY = Layout(
-    "urdfkin-history/1",
-    HistoryDocument,
-    tuple(OUTCOMES.values()),
-    "urdfkin report history DIR --format json",
+    "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
 

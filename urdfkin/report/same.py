@@ -441,14 +441,7 @@ def _draw(
     placed = [np.round((x - (low + high) / 2.0) * scale, 1).reshape(-1, 4).tolist() for x in flat]
     ruler = round_length(2.0 * HALF * SCALE / scale)
     bar = {"x": -HALF * FILLED, "y": HALF - FOOT, "width": round(ruler * scale, 1), "words": length(ruler)}
-    return {
-        "title": title,
-        "a": placed[0],
-        "b": placed[1],
-        "gap": placed[2],
-        "half": HALF,
-        "scale": bar,
-    }
+    return {"title": title, "a": placed[0], "b": placed[1], "gap": placed[2], "half": HALF, "scale": bar}
 
 
 def round_length(most: float) -> float:
