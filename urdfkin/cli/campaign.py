@@ -63,9 +63,10 @@ def progress(*, as_json: bool) -> Iterator[Progress]:
 
 
 def line(state: CampaignProgress, pace: Pace) -> str:
+    earlier = f" ({state.chunks_kept:,} from an earlier run)" if state.chunks_kept else ""
     return (
         f"{state.robots_done:,} of {state.robots:,} robots, {state.chunks_done:,} of"
-        f" {state.chunks:,} chunks{_earlier(state)}; {_speed(state, pace)}"
+        f" {state.chunks:,} chunks{earlier}; {_speed(state, pace)}"
         f"{_failures(state)}; {state.label}"
     )
 
@@ -82,10 +83,6 @@ def duration(seconds: float) -> str:
             rest = whole % size // smaller
             return f"{whole // size} {unit}" + (f" {rest} {name}" if rest else "")
     return f"{whole} s"
-
-
-def _earlier(state: CampaignProgress) -> str:
-    return f" ({state.chunks_kept:,} from an earlier run)" if state.chunks_kept else ""
 
 
 def _speed(state: CampaignProgress, pace: Pace) -> str:
@@ -151,7 +148,6 @@ def _bar(pace: Pace) -> Iterator[Progress]:
         yield tell
 
 
-EXAMPLE = "urdfkin report status nightly"
 #: `status` lists at most `_NAMED` failed robots.
 #: It estimates the time for a chunk of samples from up to `_READ` finished chunks.
 _NAMED, _READ = 20, 200
@@ -160,7 +156,9 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
 @click.command(
-    "status", short_help="Show the progress of a validation with --store.", epilog=f"Example: {EXAMPLE}"
+    "status",
+    short_help="Show the progress of a validation with --store.",
+    epilog="Example: urdfkin report status nightly",
 )
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.pass_context

@@ -26,7 +26,8 @@ from urdfkin.cli.options import (
     source_options,
     together,
 )
-from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
+from urdfkin.cli.output import hand_out
+from urdfkin.cli.streams import command_lines, harmless, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
 from urdfkin.system.git import Version, version_before
@@ -316,7 +317,7 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     if options["diff"]:
         found, among = run.outcome.to_fix, len(run.outcome.files)
         many = "s" * (found != 1), "s" * (among != 1)
-        _put_patch("".join(run.outcome.patches), options["output"])
+        hand_out("".join(run.outcome.patches), options["output"])
         more = f" ({run.outcome.unsafe} more with --unsafe-fixes)" if run.outcome.unsafe else ""
         say(f"{found} finding{many[0]} to fix in {among} file{many[1]}{more}", err=True)
     elif options["write_baseline"] is None:
@@ -324,13 +325,6 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     for failure in run.outcome.unreadable:
         say(f"urdfkin: error: {failure}", err=True)
     sys.exit(run.exit_code())
-
-
-def _put_patch(text: str, path: Path | None) -> None:
-    if path is None:
-        say_file(text)
-    else:
-        write_file(path, text.encode())
 
 
 def _put_outcome(outcome: Outcome, style: str, path: Path | None, *, statistics: bool) -> None:

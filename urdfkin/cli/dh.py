@@ -34,8 +34,6 @@ ENDINGS = {
     ".svg": ("svg",),
 }  # fmt: skip
 
-EXAMPLE = "urdfkin dh ur5 --base base --tip tool0 --snap 1e-6 --degrees --millimetres"
-
 
 def _choice(name: str, choices: tuple[str, ...], text: str) -> Any:
     return click.option(name, type=click.Choice(choices), default=choices[0], show_default=True, help=text)
@@ -182,7 +180,7 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
             reject_unused_options(context, idle, because)
 
 
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin dh ur5 --base base --tip tool0 --snap 1e-6 --degrees --millimetres")
 @robot_argument
 @part_options
 @choice_options

@@ -104,7 +104,8 @@ def run(work: Work) -> Answer:
 
 
 def _tables(work: Work) -> Answer:
-    tips = _tips(work)
+    tree = work.robot.tree
+    tips = [tree.links[leaf] for leaf in tree.leaves()] if work.all_ else [work.tip]
     if len(tips) > 1 and work.format_ not in _FORMATS_OF_SEVERAL:
         raise InputError(
             f"--all does not support the format {work.format_!r}",
@@ -122,11 +123,6 @@ def _tables(work: Work) -> Answer:
             for line in _notes(work, table, check).split("\n"):
                 say(line, err=True)
     return _answer(work, text, 0 if all(check is not None and check.within for _, check in made) else 3)
-
-
-def _tips(work: Work) -> list[str | None]:
-    tree = work.robot.tree
-    return [tree.links[leaf] for leaf in tree.leaves()] if work.all_ else [work.tip]
 
 
 def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.completion import complete_robot
-from urdfkin.cli.options import NumberFrom, Whole, load_several, reject_unused_options, source_options
+from urdfkin.cli.options import (
+    NumberFrom,
+    Whole,
+    load_several,
+    reject_unused_options,
+    schema_option,
+    source_options,
+)
 from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, compiling, write_file
 from urdfkin.cli.streams import say
 from urdfkin.errors.display import TextDocument
@@ -66,7 +73,7 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--html", type=_PATH, help="Write an HTML page with a picture of both robots at the worst configuration."
 )
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of a certificate and exit.")
+@schema_option("urdfkin.comparison.certificate:SAME", "a certificate")
 @source_options
 @answering(*TEXTS, "json")
 def same_command(
@@ -79,7 +86,6 @@ def same_command(
     boxes: int | None,
     all_: bool,
     recheck: Path | None,
-    schema: bool,
     **paths: Path | None,
 ) -> Answer:
     """Prove whether A and B are the same robot in every configuration; with C, compare each pair.
@@ -97,11 +103,6 @@ def same_command(
     --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are
     compared as written. Exit 0: all frames stay within the given distance. 1: a frame does not.
     """
-    if schema:
-        from urdfkin.comparison.certificate import SAME  # noqa: PLC0415  --help stays fast
-
-        click.echo(SAME.schema_text(), nl=False)
-        click.get_current_context().exit()
     if a is None or b is None:
         raise click.UsageError("name two robots to compare: urdfkin same A B")
     check_writable(*paths.values())

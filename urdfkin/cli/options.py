@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import importlib
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -131,45 +132,29 @@ def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
 _HOW = "urdfkin.how_to_load"
 
 
-def _remember(context: click.Context, parameter: click.Parameter, value: object) -> None:
-    """Store the value of an option that `how_to_load` returns later."""
-    context.meta.setdefault(_HOW, {})[parameter.name] = value
+def _storing(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
+    """Return a callback that stores an option for `how_to_load`, by default only if the option was given."""
+
+    def store(context: click.Context, _: click.Parameter, value: Any) -> None:
+        if always or value not in (None, ()):
+            context.meta.setdefault(_HOW, {})[name] = value if read is None else read(value)
+
+    return store
 
 
-def _remember_xacro_args(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
-    arguments = {}
-    for word in words:
-        name, colon, value = word.partition(":=")
-        if not colon or not name:
-            raise click.BadParameter(f"{word!r} is not NAME:=VALUE")
-        arguments[name] = value
-    context.meta.setdefault(_HOW, {})["xacro_args"] = arguments
+def _pairs(mark: str, form: str, *, demand_value: bool) -> Callable[[Sequence[str]], dict[str, str]]:
+    """Return a function that splits words such as SET=NAME, and rejects words of another form."""
 
+    def read(words: Sequence[str]) -> dict[str, str]:
+        pairs = {}
+        for word in words:
+            name, found, value = word.partition(mark)
+            if not found or not name or (demand_value and not value):
+                raise click.BadParameter(f"{word!r} is not {form}")
+            pairs[name] = value
+        return pairs
 
-def _remember_lock(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
-    if words:
-        context.meta.setdefault(_HOW, {})["lock"] = ", ".join(words)
-
-
-def _remember_joints(context: click.Context, _: click.Parameter, words: str | None) -> None:
-    if words is not None:
-        context.meta.setdefault(_HOW, {})["joints"] = [name.strip() for name in words.split(",")]
-
-
-def _remember_variants(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
-    chosen = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        if not equals or not name or not value:
-            raise click.BadParameter(f"{word!r} is not SET=NAME")
-        chosen[name] = value
-    if chosen:
-        context.meta.setdefault(_HOW, {})["variant"] = chosen
-
-
-def _remember_articulation(context: click.Context, _: click.Parameter, word: str | None) -> None:
-    if word is not None:
-        context.meta.setdefault(_HOW, {})["articulation"] = word
+    return read
 
 
 def how_to_load() -> dict[str, Any]:
@@ -182,7 +167,7 @@ xacro_option = click.option(
     multiple=True,
     metavar="NAME:=VALUE",
     expose_value=False,
-    callback=_remember_xacro_args,
+    callback=_storing("xacro_args", _pairs(":=", "NAME:=VALUE", demand_value=False), always=True),
     help="Argument of a .xacro file; repeatable. xacro runs in a restricted process.",
 )
 
@@ -193,14 +178,14 @@ usd_options = together(
         multiple=True,
         metavar="SET=NAME",
         expose_value=False,
-        callback=_remember_variants,
+        callback=_storing("variant", _pairs("=", "SET=NAME", demand_value=True)),
         help="Select a variant of a USD stage; repeatable.",
     ),
     click.option(
         "--articulation",
         metavar="PATH",
         expose_value=False,
-        callback=_remember_articulation,
+        callback=_storing("articulation"),
         help="Path of the articulation to load, if a USD stage has several.",
     ),
 )
@@ -209,14 +194,13 @@ source_options = together(xacro_option, usd_options)
 
 
 def mimic_option(help_: str) -> Callable[[_F], _F]:
-    return click.option(
-        "--mimic/--no-mimic", default=None, expose_value=False, callback=_remember, help=help_
-    )
+    store = _storing("mimic", always=True)
+    return click.option("--mimic/--no-mimic", default=None, expose_value=False, callback=store, help=help_)
 
 
 def root_joint_option(help_: str) -> Callable[[_F], _F]:
-    joints = click.Choice(["floating", "planar"])
-    return click.option("--root-joint", type=joints, expose_value=False, callback=_remember, help=help_)
+    joints, store = click.Choice(["floating", "planar"]), _storing("root_joint", always=True)
+    return click.option("--root-joint", type=joints, expose_value=False, callback=store, help=help_)
 
 
 lock_options = together(
@@ -225,7 +209,7 @@ lock_options = together(
         multiple=True,
         metavar="NAME=VALUE",
         expose_value=False,
-        callback=_remember_lock,
+        callback=_storing("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
         " With --joints, the value of the first --lock may be a pose, such as ready.",
     ),
@@ -233,7 +217,7 @@ lock_options = together(
         "--joints",
         metavar="NAMES",
         expose_value=False,
-        callback=_remember_joints,
+        callback=_storing("joints", lambda words: [name.strip() for name in words.split(",")]),
         help="Joints that remain, separated by commas. All others are fixed at 0, or at the value of --lock.",
     ),
 )
@@ -326,6 +310,19 @@ def trajectory_option(help_: str) -> Callable[[_F], _F]:
     return click.option(
         "--trajectory", type=click.Path(path_type=Path), metavar="FILE", help=f"{help_} File: {files}."
     )
+
+
+def schema_option(layout: str, what: str) -> Callable[[_F], _F]:
+    """Make the option --schema, which prints the JSON Schema of a layout such as "urdfkin.module:SAME"."""
+
+    def show(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+        if wanted and not context.resilient_parsing:
+            module, name = layout.split(":")
+            click.echo(getattr(importlib.import_module(module), name).schema_text(), nl=False)
+            context.exit()
+
+    help_ = f"Print the JSON Schema of {what} and exit."
+    return click.option("--schema", is_flag=True, expose_value=False, callback=show, help=help_)
 
 
 def conversion_of(robot: Robot, name: str | None) -> Conversion | None:

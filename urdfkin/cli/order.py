@@ -16,13 +16,12 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Conversion
     from urdfkin.robot import Robot
 
-EXAMPLE = "urdfkin order a1 --from isaaclab --to mujoco"
 _NO_ORDER = (
     "The joint order of idyntree follows no known rule; pass it as robot.convention('idyntree', joints=[...])"
 )
 
 
-@click.command("order", epilog=f"Example: {EXAMPLE}")
+@click.command("order", epilog="Example: urdfkin order a1 --from isaaclab --to mujoco")
 @robot_argument
 @click.option("--from", "start", metavar="NAME|FILE", help="Convention to convert from. Default: urdfkin.")
 @click.option("--to", "end", metavar="NAME|FILE", help="Convention to convert to. Default: urdfkin.")

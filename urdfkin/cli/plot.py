@@ -35,10 +35,8 @@ PANELS = (
     *("angular-manipulability", "disagreement"),
 )
 
-EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.svg"
 
-
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.svg")
 @robot_argument
 @frame_option
 @reference_option

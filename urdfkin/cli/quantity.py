@@ -83,16 +83,11 @@ def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Cal
     )
 
 
-def _load() -> Robot:
-    options = click.get_current_context().params
-    return load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
-
-
 def _read() -> Inputs:
     """Load the robot of the command; read q, v and a or --trajectory, and the --base options."""
     options = click.get_current_context().params
     values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
-    robot = _load()
+    robot = load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
     conversion = conversion_of(robot, options["convention"])
     if options["trajectory"] is not None:
         inputs = _along(robot, options["frame"], options["trajectory"], "".join(values), conversion)

@@ -15,10 +15,8 @@ from urdfkin.errors.escape import csv_value
 if TYPE_CHECKING:
     from urdfkin.comparison.readers import LibraryReading
 
-EXAMPLE = "urdfkin readers ur5 --with mujoco,yourdfpy"
 
-
-@click.command("readers", epilog=f"Example: {EXAMPLE}")
+@click.command("readers", epilog="Example: urdfkin readers ur5 --with mujoco,yourdfpy")
 @robot_argument
 @click.option("--with", "libraries", metavar="NAME,...", help="Libraries. Default: all that are installed.")
 @click.option(

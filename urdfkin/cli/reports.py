@@ -12,7 +12,7 @@ import click
 
 from urdfkin.cli.campaign import merge, status
 from urdfkin.cli.exit import crash, refuse
-from urdfkin.cli.options import NumberFrom, together
+from urdfkin.cli.options import NumberFrom, schema_option, together
 from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, console, write_file
 from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError, UrdfkinError
@@ -120,11 +120,9 @@ def report_command() -> None:
 @click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as JSON.")
 @report_options
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of a report and exit.")
+@schema_option("urdfkin.validation.document:VALIDATION", "a report")
 @click.pass_context
-def show(
-    context: click.Context, /, results: Path | None, cases: bool, schema: bool, **files: Path | None
-) -> None:
+def show(context: click.Context, /, results: Path | None, cases: bool, **files: Path | None) -> None:
     """Show a report or convert it to HTML, JUnit or Markdown.
 
     RESULTS can be the folder of --store, even while the validation runs. If robots are still missing in this
@@ -134,11 +132,8 @@ def show(
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
-    from urdfkin.validation.document import VALIDATION, outcome_of  # noqa: PLC0415  --help stays fast
+    from urdfkin.validation.document import outcome_of  # noqa: PLC0415  --help stays fast
 
-    if schema:
-        click.echo(VALIDATION.schema_text(), nl=False)
-        return
     if results is None:
         raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
     document = stored_document(results) if is_folder(results) else read_document(results)
@@ -207,9 +202,9 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 )
 @click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--all", "all_", is_flag=True, help="Show all runs and changes, not only the latest.")
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
+@schema_option("urdfkin.report.history:HISTORY", "the data")
 @answering(*TEXTS, "json")
-def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
+def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
     """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
 
     The arguments are reports (JSON files), the folders of `validate --store`, or folders that contain both.
@@ -220,11 +215,8 @@ def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
     If a file cannot be used, the command prints its name and the reason, and shows the other files. Exit 0:
     every file was used. 2: a file cannot be used.
     """
-    from urdfkin.report.history import HISTORY, as_html, document, history  # noqa: PLC0415
+    from urdfkin.report.history import as_html, document, history  # noqa: PLC0415
 
-    if schema:
-        click.echo(HISTORY.schema_text(), nl=False)
-        click.get_current_context().exit()
     if not paths:
         raise click.UsageError("give reports, or a folder with reports: urdfkin report history DIR")
     found = history(paths)

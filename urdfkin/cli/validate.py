@@ -140,7 +140,6 @@ def _study(
 
 
 _T = TypeVar("_T", bound=click.Command)
-EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
 
 def _with_quantities(command: _T) -> _T:
@@ -150,7 +149,7 @@ def _with_quantities(command: _T) -> _T:
 
 
 @_with_quantities
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0")
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robot)
 @click.option(
     "--all", "all_", is_flag=True, help="Validate all robots of example-robot-data in the catalogue."

@@ -24,10 +24,8 @@ from urdfkin.cli.output import compiling
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 
-EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
 
-
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04")
 @robot_argument
 @click.option(
     "--host",
