@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -205,7 +206,7 @@ def structure_command(
         screws = loaded.screws(tip, base, verify=False)
         check = check_screws(loaded.verifier, screws) if verify else None
         found = structure(screws)
-        data = {"json": lambda: finite(found.as_mapping())}
+        data = {"json": lambda: finite(asdict(found))}
         return Answer(lambda: _document(found), data, *check_of_path(check))
     path = loaded.chain(tip, base)
     parameters = opw_of(path, opw / 1e3)

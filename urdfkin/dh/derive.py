@@ -36,8 +36,8 @@ from urdfkin.dh.common_normals import (
     steps_like,
     tilt_of,
 )
-from urdfkin.dh.table import Convention, DHRow, DHTable, along_axis, as_step, between_axes, convention_of
-from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.dh.table import Convention, DHRow, DHTable, along_axis, as_step, between_axes
+from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import ChainJoint, FrameChain
 from urdfkin.model.tree import FloatArray
@@ -103,41 +103,12 @@ class Choices:
 _Choice = TypeVar("_Choice", bound=StrEnum)
 
 
-def _choice(kind: type[_Choice], name: str, value: str) -> _Choice:
+def choice(kind: type[_Choice], name: str, value: str) -> _Choice:
     try:
         return kind(value)
     except ValueError:
         known = " or ".join(repr(member.value) for member in kind)
         raise InputError(f"unknown value of `{name}`", found=repr(value), remedy=f"write {known}") from None
-
-
-def choices_of(
-    chain: FrameChain,
-    *,
-    convention: str,
-    near_parallel: str,
-    last: str,
-    parallel_offset: str,
-    flip: Collection[str],
-    first: str = "base",
-    sign: str = "theta",
-    slide: str = "drawn",
-) -> Choices:
-    """Return the options with the given names; raise InputError or UnknownNameError for an unknown name."""
-    names = [joint.name for joint in chain.joints]
-    for name in flip:
-        if name not in names:
-            raise UnknownNameError("joint", name, names, where=f"path {chain.base} to {chain.tip}")
-    return Choices(
-        convention_of(convention),
-        _choice(NearParallel, "near_parallel", near_parallel),
-        _choice(Last, "last", last),
-        _choice(ParallelOffset, "parallel_offset", parallel_offset),
-        tuple(flip),
-        _choice(First, "first", first),
-        _choice(Sign, "sign", sign),
-        _choice(Slide, "slide", slide),
-    )
 
 
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:

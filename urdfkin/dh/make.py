@@ -17,14 +17,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.common_normals import demand_squares
+from urdfkin.dh.common_normals import NearParallel, demand_squares
 from urdfkin.dh.compare.agreement import check_joints
 from urdfkin.dh.compare.fit import align
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.derive import Choices, choices_of, derive
+from urdfkin.dh.derive import Choices, First, Last, ParallelOffset, Sign, Slide, choice, derive
 from urdfkin.dh.snapping import checked_tolerance, row_of_constant, snap_chain, snap_thetas, statement
-from urdfkin.dh.table import Convention, DHTable
-from urdfkin.errors import InputError, Question
+from urdfkin.dh.table import Convention, DHTable, convention_of
+from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
@@ -167,16 +167,19 @@ def dh_table(
     # The whole path from the root is checked, because Pinocchio computes poses relative to the root.
     ends = [tip] if base is None else [base, tip]
     demand_squares(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
-    choices = choices_of(
-        exact,
-        convention=convention,
-        near_parallel=near_parallel,
-        last=last,
-        parallel_offset=parallel_offset,
-        flip=flip,
-        first=first,
-        sign=sign,
-        slide=slide,
+    names = [joint.name for joint in exact.joints]
+    for name in flip:
+        if name not in names:
+            raise UnknownNameError("joint", name, names, where=f"path {exact.base} to {exact.tip}")
+    choices = Choices(
+        convention_of(convention),
+        choice(NearParallel, "near_parallel", near_parallel),
+        choice(Last, "last", last),
+        choice(ParallelOffset, "parallel_offset", parallel_offset),
+        tuple(flip),
+        choice(First, "first", first),
+        choice(Sign, "sign", sign),
+        choice(Slide, "slide", slide),
     )
     if like is not None:
         choices = replace(choices, flip=reversed_like(exact, choices, like))

@@ -16,6 +16,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeGuard, TypeVar
 
@@ -215,7 +216,7 @@ def _separated(lines: list[str]) -> _Grid | None:
     """
     for mark in (";", "\t", ","):
         kept = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
-        if grid := _grid(kept, lambda line, mark=mark: _csv_cells(line, mark), mark):  # type: ignore[misc]
+        if grid := _grid(kept, partial(_csv_cells, mark=mark), mark):
             return grid
     return None
 
@@ -519,17 +520,9 @@ def _is_markup(path: Path) -> bool:
         return False
 
 
-def _from_toml(text: str) -> dict[str, Any]:
-    return tomllib.loads(text, parse_float=Literal)
-
-
-def _from_json(text: str) -> Any:
-    return json.loads(text, parse_float=Literal)
-
-
 _PARSERS: dict[str, Callable[[str], Any]] = {
-    ".toml": _from_toml,
-    ".json": _from_json,
+    ".toml": partial(tomllib.loads, parse_float=Literal),
+    ".json": partial(json.loads, parse_float=Literal),
     **dict.fromkeys((".csv", ".tsv", ".md", ".tex", ".txt"), from_sheet),
 }
 

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -114,9 +114,6 @@ class Structure:
     reach: float
     reached: float
     solvers: tuple[str, ...]
-
-    def as_mapping(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def structure(screws: ProductOfExponentials) -> Structure:

@@ -47,9 +47,7 @@ def document(found: Calibration) -> TextDocument:
     if found.fitted is None or found.before is None:
         return TextDocument(title, parts)
     noise = found.fitted.noise
-    said = f"{length(noise.metres)}" + (
-        f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else ""
-    )
+    said = length(noise.metres) + (f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else "")
     every = sum(p in found.writable for p in identification.kept)
     few = found.written_fit is not None and len(found.written_parameters) < every
     as_written = (
@@ -60,9 +58,8 @@ def document(found: Calibration) -> TextDocument:
     parts.append(f"rms error before the fit: {_rms(found.before)}; after: {_rms(found.fitted)}{as_written}")
     if few:
         parts.append(
-            f"written: {len(found.written_parameters)} of {every} parameters, those that changed by more"
-            " than "
-            "2 sigma"
+            f"written: {len(found.written_parameters)} of {every} parameters, those that changed by more than"
+            " 2 sigma"
         )
     if not found.stated and not found.fitted.is_judged:
         parts.append("noise: unknown, because there are no redundant measurements")

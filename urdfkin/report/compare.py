@@ -50,12 +50,12 @@ def model_changes(old: Model | None, new: Model | None) -> Iterator[tuple[str, s
             yield f"joint {name}", was["kind"] if was else "", now["kind"] if now else ""
             continue
         for aspect, first, second in _joint_changes(was, now):
-            yield f"joint {name}, {aspect}", _cut(first), _cut(second)
+            yield f"joint {name}, {aspect}", shortened(first, _LONGEST), shortened(second, _LONGEST)
     if old is not None and new is not None:
         for entry, what in (("base", "base frame"), ("tip", "tip frame"), ("coordinates", "coordinates")):
             frames = dict(old)[entry], dict(new)[entry]
             if frames[0] != frames[1]:
-                yield what, _cut(_names(frames[0])), _cut(_names(frames[1]))
+                yield what, shortened(_names(frames[0]), _LONGEST), shortened(_names(frames[1]), _LONGEST)
 
 
 def _joints(model: Model | None) -> dict[str, Joint]:
@@ -99,10 +99,6 @@ def _rule(joint: Joint) -> str:
 
 def _names(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 4] + " ..."
 
 
 def document(old: Document, new: Document, found: Comparison) -> TextDocument:

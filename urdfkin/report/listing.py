@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
@@ -25,16 +25,6 @@ def print_document(out: Console, document: TextDocument) -> None:
                 out.print(line)
         else:
             out.print(part, style=getattr(part, "style", None))
-
-
-def print_named(
-    out: Console,
-    columns: Sequence[str],
-    rows: Iterable[Sequence[str | float]],
-    *,
-    left: Collection[int] = (0,),
-) -> None:
-    print_table(out, Table(columns, list(rows), left))
 
 
 def print_table(out: Console, table: Table) -> None:

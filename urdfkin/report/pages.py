@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from urdfkin.dh.units import Units as DisplayUnits
 from urdfkin.model.configuration import range_words
@@ -25,10 +25,6 @@ from urdfkin.report.words import (
     worst_of,
 )
 from urdfkin.validation.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
-
-if TYPE_CHECKING:
-    pass
-
 
 _READABLE = DisplayUnits(digits=6)
 
@@ -205,8 +201,7 @@ def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
 
     The cell of theta (revolute joint) or d (prismatic joint) also contains q.
     """
-    table = chain["standard"] if convention == "standard" else chain["modified"]
-    return [_dh_cells(row, has_beta(chain)) for row in table["rows"]]
+    return [_dh_cells(row, has_beta(chain)) for row in _rows(chain, convention)]
 
 
 def has_beta(chain: Chain) -> bool:
@@ -223,14 +218,8 @@ def _dh_cells(row: Row, beta: bool) -> list[str]:
     d, theta = metres(row["d"]), angle(row["theta"])
     d = _plus(d, f"{sign} q") if is_prismatic else d
     theta = theta if is_prismatic else _plus(theta, f"{sign} q")
-    return [
-        row["joint"],
-        metres(row["a"]),
-        angle(row["alpha"]),
-        *([angle(row["beta"])] if beta else []),
-        d,
-        theta,
-    ]
+    betas = [angle(row["beta"])] if beta else []
+    return [row["joint"], metres(row["a"]), angle(row["alpha"]), *betas, d, theta]
 
 
 def _plus(constant: str, variable: str) -> str:

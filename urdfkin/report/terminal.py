@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from urdfkin.errors.display import Table
-from urdfkin.report.listing import print_named, print_table
+from urdfkin.report.listing import print_table
 from urdfkin.report.words import (
     SIDES,
     check_name,
@@ -87,7 +87,7 @@ def _print_wide(robots: Sequence[Robot], out: Console) -> None:
         [*_counts(robot), *(worst_of(robot, names) for names in quantities_of.values()), robot["verdict"]]
         for robot in robots
     )
-    print_named(out, heads, rows, left=(0, len(heads) - 1))
+    print_table(out, Table(heads, list(rows), left=(0, len(heads) - 1)))
 
 
 def _print_robots(robots: Sequence[Robot], out: Console) -> None:
@@ -101,7 +101,7 @@ def _print_robots(robots: Sequence[Robot], out: Console) -> None:
         ]
         for robot in robots
     )
-    print_named(out, heads, rows, left=(0, 6))
+    print_table(out, Table(heads, list(rows), left=(0, 6)))
 
 
 def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
@@ -115,7 +115,7 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
             if any(check["worst"] == largest for check in of_quantity(robot, name))
         )
         rows.append([quantity_name(name), *_figures(checks), where])
-    print_named(out, ["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4))
+    print_table(out, Table(["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4)))
 
 
 def _three_sides(robots: Sequence[Robot], title: str) -> Table:
@@ -147,7 +147,7 @@ def _print_checks(robot: Robot, out: Console) -> None:
         for check in in_order(robot)
     )
     out.print(robot["source"], style="bold")
-    print_named(out, heads, rows)
+    print_table(out, Table(heads, list(rows)))
 
 
 def _judged(judgement: Judgement) -> Table:

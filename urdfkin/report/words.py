@@ -82,7 +82,7 @@ def of_quantity(robot: Robot, quantity: str) -> list[Check]:
 
 
 def in_order(robot: Robot) -> list[Check]:
-    return [check for quantity in quantities([robot]) for check in of_quantity(robot, quantity)]
+    return column(robot, quantities([robot]))
 
 
 def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:

@@ -88,7 +88,9 @@ def compare(
     written = as_written(standard)
     fitted = fitted_model(chain, standard, written, tried) if fit else written
     complete = fit_cells(fitted, tried, _cells_of(reference), free=fit)
-    off, residual = _off(fitted, written, judged), judged.apart(complete)[0]
+    metres, radians = judged.apart(fitted)
+    written_metres, written_radians = judged.apart(written)
+    residual = judged.apart(complete)[0]
     cells = _differences(chain, reference, fitted, complete, judged, digits, fit)
     table = _fitted_table(chain, standard, fitted)
     most_metres, most_radians = max_tip_error_bound(chain, table, _slides(chain))
@@ -100,7 +102,7 @@ def compare(
         offsets=_offsets(standard, fitted),
         base=_absorbed_offset(written.base, fitted.base),
         tool=_absorbed_offset(written.tool, fitted.tool),
-        differences=cells if residual <= max(_EXPLAINS * off["metres"], EXPLAINED * tried.scale) else (),
+        differences=cells if residual <= max(_EXPLAINS * metres, EXPLAINED * tried.scale) else (),
         instead=(),
         hidden=_hidden(reference, fitted, judged) if fit else (),
         mistakes=(),
@@ -109,7 +111,10 @@ def compare(
         samples=CHECK_SAMPLES,
         most_metres=most_metres,
         most_radians=most_radians,
-        **off,
+        metres=metres,
+        radians=radians,
+        written_metres=written_metres,
+        written_radians=written_radians,
     )
     if found.as_written:
         return found
@@ -134,11 +139,6 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     standard = to_convention(reference, Convention.STANDARD)
     tried, judged = _target_poses(chain)
     return judged.apart(fitted_model(chain, standard, as_written(standard), tried, enough, hasty=True))
-
-
-def _off(fitted: Model, written: Model, judged: TargetPoses) -> dict[str, float]:
-    names = ("metres", "radians", "written_metres", "written_radians")
-    return dict(zip(names, (*judged.apart(fitted), *judged.apart(written)), strict=True))
 
 
 def _reach(chain: FrameChain, wanted: FloatArray) -> float:

@@ -164,14 +164,6 @@ def _latex(screws: ProductOfExponentials, digits: int) -> str:
     return "\n".join([*lines, *pose("$M$", screws.M), r"\end{table}"]) + "\n"
 
 
-def _toml(screws: ProductOfExponentials) -> str:
-    return "".join(f"{key} = {json.dumps(value)}\n" for key, value in screws.as_mapping().items())
-
-
-def _json(screws: ProductOfExponentials) -> str:
-    return json.dumps(screws.as_mapping(), indent=2) + "\n"
-
-
 def _numpy(screws: ProductOfExponentials) -> str:
     lines = [
         f'"""{plain(screws.robot)}: M, space and body screws as columns (w, v), metres: Modern Robotics."""'
@@ -207,8 +199,8 @@ def _matlab(screws: ProductOfExponentials) -> str:
 
 #: These functions write exact numbers.
 _CODE: dict[str, Callable[[ProductOfExponentials], str]] = {
-    "toml": _toml,
-    "json": _json,
+    "toml": lambda screws: "".join(f"{key} = {json.dumps(x)}\n" for key, x in screws.as_mapping().items()),
+    "json": lambda screws: json.dumps(screws.as_mapping(), indent=2) + "\n",
     "numpy": _numpy,
     "matlab": _matlab,
 }
