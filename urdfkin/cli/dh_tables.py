@@ -111,7 +111,9 @@ def _tables(work: Work) -> Answer:
             f"--all does not support the format {work.format_!r}",
             remedy=f"use --format {', '.join(_FORMATS_OF_SEVERAL)}",
         )
-    made = [_table(work, tip) for tip in tips]
+    verifier = work.robot.verifier
+    tables = [_make_table(work, tip, work.snap) for tip in tips]
+    made = [(table, verifier.table(table) if verifier.policy else None) for table in tables]
     if work.format_ == "json" and work.all_:
         text = json.dumps([_document(table, check) for table, check in made], indent=2) + "\n"
     elif work.format_ == "json":
@@ -123,11 +125,6 @@ def _tables(work: Work) -> Answer:
             for line in _notes(work, table, check).split("\n"):
                 say(line, err=True)
     return _answer(work, text, 0 if all(check is not None and check.within for _, check in made) else 3)
-
-
-def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
-    robot, table = work.robot, _make_table(work, tip, work.snap)
-    return table, robot.verifier.table(table) if robot.verifier.policy else None
 
 
 def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:

@@ -25,7 +25,7 @@ uncertain by 0.5 mm.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
@@ -113,7 +113,7 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
     row = row.tolist() if isinstance(row, np.ndarray) else row
     where = f"row {index + 1}"
     fields = row if isinstance(row, Mapping) else _of_list(row, where)
-    _check_keys(fields, _KEYS, "a row", where)
+    check_keys(fields, _KEYS, "a row", where)
     fields = _split_variable(fields, index, where)
     cells = {name: _cell(name, fields.get(name, 0.0), units, where) for name in (*ORDER, "beta")}
     return DHRow(
@@ -137,7 +137,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
         return
-    first, second, _, fourth = ([row[k] for row in lists if not _is_zero(row[k])] for k in range(4))
+    first, second, _, fourth = ([row[k] for row in lists if row[k] != 0] for k in range(4))
     if second and fourth and not any(map(_looks_round, second)) and all(map(_looks_round, [*first, *fourth])):
         raise InputError(
             "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a list must have"
@@ -157,10 +157,6 @@ def name_of(value: Any, where: str) -> str:
 
 def _has_order(row: Sequence[Any]) -> bool:
     return len(row) == len(ORDER) or (len(row) == len(ORDER) + 1 and isinstance(row[-1], str))
-
-
-def _is_zero(value: Any) -> bool:
-    return not isinstance(value, str) and value == 0
 
 
 def _looks_round(value: Any) -> bool:
@@ -193,7 +189,7 @@ def _of_list(row: Any, where: str) -> dict[str, Any]:
     return dict(zip((*ORDER, "kind"), row, strict=False))
 
 
-def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str) -> None:
+def check_keys(given: Iterable[str], keys: Sequence[str], what: str, where: str | None = None) -> None:
     for key in given:
         if key not in keys:
             raise InputError(
@@ -313,7 +309,7 @@ def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> M
         raise InputError(
             "`mimic` must have the form {leader, multiplier, offset}", where=where, found=repr(value)
         )
-    _check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
+    check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
     return Mimic(
         name_of(value["leader"], f"{where}, leader"),
         read_number(value.get("multiplier", 1.0), f"{where}, multiplier"),
@@ -328,7 +324,7 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
         raise InputError(
             "`limit` must have the form {lower, upper, velocity, effort}", where=where, found=repr(value)
         )
-    _check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
+    check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
     lower, upper, velocity = (
         _own(name, value[name], fields, units, where) if name in value else default
         for name, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))
@@ -426,13 +422,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
             remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
             question=Question.WHICH_DH_CONVENTION,
         )
-    for key in data:
-        if key not in _TABLE_KEYS and key not in NOTES:
-            raise InputError(
-                "unknown key in a table",
-                found=repr(key),
-                remedy=f"the known keys are {', '.join(_TABLE_KEYS)}",
-            )
+    check_keys([key for key in data if key not in NOTES], _TABLE_KEYS, "a table")
     options = {key: data[key] for key in _TABLE_KEYS if key in data and key not in ("convention", "rows")}
     return table_from_rows(data.get("rows"), data["convention"], **options)
 

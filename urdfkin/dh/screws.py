@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.dh.convert import UNBOUNDED_SLIDE
+from urdfkin.dh.rows import check_keys
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line
@@ -350,13 +351,7 @@ def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     The errors are those of `screws_from`, and InputError for an unknown key or without space and body.
     """
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
-    for key in data:
-        if key not in known:
-            raise InputError(
-                "unknown key in the table of screws",
-                found=repr(key),
-                remedy=f"the known keys are {', '.join(known)}",
-            )
+    check_keys(data, known, "the table of screws")
     frame = next((one for one in ("space", "body") if one in data), None)
     if frame is None:
         raise InputError(

@@ -32,13 +32,6 @@ def headline(found: Changes) -> str:
     return f"{head}; together they {motion_words(found.total)}"
 
 
-def _by_element(found: Changes) -> dict[str, list[Change]]:
-    grouped: dict[str, list[Change]] = {}
-    for change in found.changes:
-        grouped.setdefault(change.element, []).append(change)
-    return grouped
-
-
 #: Columns of the table of pairs
 PAIRS = ("old", "new", "changes")
 
@@ -62,7 +55,10 @@ def pairs_markdown(found: Sequence[Changes]) -> str:
 def lines_of(found: Changes) -> list[str]:
     """Return the changes as lines; a changed joint also has a line with the distance that a frame moves."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
-    for element, changes in _by_element(found).items():
+    by_element: dict[str, list[Change]] = {}
+    for change in found.changes:
+        by_element.setdefault(change.element, []).append(change)
+    for element, changes in by_element.items():
         lines += [f"  {change}" for change in changes]
         if (effect := found.effect_of.get(element)) is not None:
             lines.append(f"    {effect}")

@@ -188,8 +188,8 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
     """Yield the path of each file or store; a folder contributes its files *.json at any depth."""
     count = 0
     for path in paths:
-        inside = _in_folder(path) if is_folder(path) and not _is_store(path) else iter([path])
-        for file in inside:
+        has_reports = is_folder(path) and not (path / "manifest.json").is_file()
+        for file in _in_folder(path) if has_reports else iter([path]):
             count += 1
             if count > MOST_RUNS:
                 raise InputError(
@@ -198,10 +198,6 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
                     remedy="name fewer files, or a folder with fewer files",
                 )
             yield file
-
-
-def _is_store(path: Path) -> bool:
-    return (path / "manifest.json").is_file()
 
 
 def _in_folder(folder: Path) -> Iterator[Path]:

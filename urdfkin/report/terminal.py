@@ -34,7 +34,7 @@ from urdfkin.report.words import (
     worst,
     worst_of,
 )
-from urdfkin.validation.document import Check, Document, Judgement, Robot, outcome_of
+from urdfkin.validation.document import Document, Judgement, Robot, outcome_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -114,7 +114,9 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
             for robot in robots
             if any(check["worst"] == largest for check in of_quantity(robot, name))
         )
-        rows.append([quantity_name(name), *_figures(checks), where])
+        results = f"{sum(check['results'] for check in checks):,}"
+        share = percent(worst(check["share_of_bound"] for check in checks))
+        rows.append([quantity_name(name), results, units(largest), share, where])
     print_table(out, Table(["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4)))
 
 
@@ -122,14 +124,6 @@ def _three_sides(robots: Sequence[Robot], title: str) -> Table:
     rows = ([quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title))
     heads = [head.replace(", ", ",\n") for head in second_oracle_heads(title)]
     return Table(["quantity", *heads], list(rows), left=(0, 5))
-
-
-def _figures(checks: Sequence[Check]) -> list[str]:
-    return [
-        f"{sum(check['results'] for check in checks):,}",
-        units(worst(check["worst"] for check in checks)),
-        percent(worst(check["share_of_bound"] for check in checks)),
-    ]
 
 
 def _print_checks(robot: Robot, out: Console) -> None:

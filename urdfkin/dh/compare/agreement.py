@@ -189,11 +189,11 @@ def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, Floa
 
 
 def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
-    return {joint.name: _slide(joint.limit) for joint in chain.joints if not joint.kind.turns}
-
-
-def _slide(limit: Limit | None) -> tuple[float, float]:
-    return (limit.lower, limit.upper) if is_bounded(limit) and limit.lower < limit.upper else _SLIDE
+    limits = {joint.name: joint.limit for joint in chain.joints if not joint.kind.turns}
+    return {
+        name: (limit.lower, limit.upper) if is_bounded(limit) and limit.lower < limit.upper else _SLIDE
+        for name, limit in limits.items()
+    }
 
 
 def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:

@@ -506,7 +506,7 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
     """
     reach = max(chain.reach, reference.span, LEAST_SIZE)
     n = len(reference.rows)
-    partials = [_first(sense) for sense in (1, -1)]
+    partials = [_Partial(REVERSAL * (sense < 0), (sense,), (), 0.0, 0.0, np.eye(4)) for sense in (1, -1)]
     for i in range(n - 1):
         longer = [
             extended
@@ -523,10 +523,6 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
         by_senses.setdefault(partial.senses, partial)
     best = list(by_senses.values())[:count]
     return [_close_chain(partial, chain, reference) for partial in best]
-
-
-def _first(sense: int) -> _Partial:
-    return _Partial(REVERSAL * (sense < 0), (sense,), (), 0.0, 0.0, np.eye(4))
 
 
 def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:

@@ -268,7 +268,7 @@ def _verdict(found: Comparison) -> list[str]:
     ends = [
         f"{what} by {change.metres * 1e3:.3g} mm and {change.radians:.3g} rad"
         for what, change in (("the base", found.base), ("the tool", found.tool))
-        if _is_moved(change, found)
+        if change.metres > found.rounding * found.reach or change.radians > found.rounding
     ]
     zeros = sum(abs(offset) > fine for offset in found.offsets)
     if zeros:
@@ -305,10 +305,6 @@ def _proven(found: Comparison) -> str:
     if math.isinf(found.most_metres):
         return "nothing"
     return f"{found.most_metres * 1e3:.3g} mm and {found.most_radians:.3g} rad"
-
-
-def _is_moved(change: AbsorbedOffset, found: Comparison) -> bool:
-    return change.metres > found.rounding * found.reach or change.radians > found.rounding
 
 
 def _mistakes(found: Comparison, units: Units) -> list[str]:

@@ -211,7 +211,8 @@ class ConventionHypothesis:
         """Return the table in this interpretation, without base and tool; raise InputError if invalid."""
         said = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         rows = [self._row(row) for row in data["rows"]]
-        return table_from_mapping({**_bare(data), **said, "rows": rows})
+        rest = {key: value for key, value in data.items() if key not in _ENDS}
+        return table_from_mapping({**rest, **said, "rows": rows})
 
     def _row(self, row: Mapping[str, Any]) -> dict[str, Any]:
         meant = dict(zip(ORDER, self.columns, strict=True))
@@ -243,9 +244,10 @@ def as_said(data: Mapping[str, Any]) -> ConventionHypothesis:
 
 def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothesis, DHTable]]:
     """Yield every other interpretation in which the table is valid, the most similar first."""
-    if not _has_rows(data):
+    rows = data.get("rows")
+    if not isinstance(rows, list) or not all(isinstance(row, (list, Mapping)) for row in rows):
         return
-    data, said = {**data, "rows": [_row(row) for row in data["rows"]]}, as_said(data)
+    data, said = {**data, "rows": [_row(row) for row in rows]}, as_said(data)
     every = (ConventionHypothesis(*one) for one in product(Convention, Lengths, Angles, permutations(ORDER)))
     for reading in sorted(every, key=lambda one: one.slips(said)):
         if reading == said:
@@ -254,15 +256,6 @@ def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothes
             yield reading, reading.of(data)
         except InputError:
             continue
-
-
-def _has_rows(data: Mapping[str, Any]) -> bool:
-    rows = data.get("rows")
-    return isinstance(rows, list) and all(isinstance(row, (list, Mapping)) for row in rows)
-
-
-def _bare(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in data.items() if key not in _ENDS}
 
 
 def _row(row: Mapping[str, Any] | Sequence[Any]) -> dict[str, Any]:

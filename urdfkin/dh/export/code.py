@@ -150,9 +150,8 @@ def placement(q):
 '''
 
 
-def write_sympy(table: DHTable, units: Units) -> str:
+def write_sympy(table: DHTable) -> str:
     """Return a module with `placement(q)`, for `q = symbols("q1:7")` or numbers."""
-    del units
     number, n = Fractions(), len(table.joint_names)
     base, tool = (
         "[" + ", ".join(f"[{', '.join(map(number.length, row))}]" for row in T.tolist()) + "]"
@@ -193,12 +192,11 @@ class _Matlab(Fractions):
         return f"vpa('{x!r}')"
 
 
-def write_matlab_symbolic(table: DHTable, units: Units) -> str:
+def write_matlab_symbolic(table: DHTable) -> str:
     """Return a function file `ROBOT_symbolic.m` for MATLAB.
 
     Use it as `[T, q] = ROBOT_symbolic()`, then `matlabFunction(T, 'Vars', {q})`.
     """
-    del units
     number, n = _Matlab(), len(table.joint_names)
     lines = [f"function [T, q] = {identifier(table.robot)}_symbolic()"]
     lines += [f"% {line}" for line in header(table)]

@@ -15,7 +15,6 @@ from dataclasses import asdict
 from typing import Any
 
 from urdfkin.dh.table import DHRow, DHTable
-from urdfkin.dh.units import Units
 from urdfkin.errors.escape import csv_cell, escape
 
 
@@ -71,13 +70,11 @@ def _row(row: DHRow) -> dict[str, Any]:
     return data
 
 
-def write_json(table: DHTable, units: Units) -> str:
-    del units
+def write_json(table: DHTable) -> str:
     return json.dumps(to_mapping(table), indent=2, allow_nan=False) + "\n"
 
 
-def write_toml(table: DHTable, units: Units) -> str:
-    del units
+def write_toml(table: DHTable) -> str:
     data = to_mapping(table)
     rows = data.pop("rows")
     lines = [f"{key} = {_value(value)}" for key, value in data.items()]
@@ -101,9 +98,8 @@ COLUMNS = (
 )
 
 
-def write_csv(table: DHTable, units: Units) -> str:
+def write_csv(table: DHTable) -> str:
     """Return the table in CSV: comment lines `# key: value`, a line of column names, then the rows."""
-    del units
     data = to_mapping(table)
     rows = data.pop("rows")
     data.pop("snap", None)

@@ -25,16 +25,15 @@ from urdfkin.dh.export.text import fitted, is_identity, maths, pose, pose_matrix
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import axes_and_steps
 from urdfkin.dh.table import Convention, DHRow, DHTable
-from urdfkin.dh.units import Units
 from urdfkin.errors.display import Code, Matrix, Table, TextDocument, six_digits
 from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
 
-def write_roboticstoolbox(table: DHTable, units: Units) -> str:
+def write_roboticstoolbox(table: DHTable) -> str:
     """Return a module with `robot`, a DHRobot or a Robot; raise InputError for a mimic joint."""
     if table.has_hayati_rows or not table.rows:
-        return write_ets(table, units)
+        return write_ets(table)
     demand_free(table, "DHRobot")
     lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "", "robot = rtb.DHRobot(", "    ["]
@@ -56,9 +55,8 @@ def _link(row: DHRow, convention: Convention) -> str:
     return f"rtb.{kind}{suffix}({', '.join([*given, *joint_transform(row)])})"
 
 
-def write_matlab_rst(table: DHTable, units: Units) -> str:
+def write_matlab_rst(table: DHTable) -> str:
     """Return a function file `ROBOT_tree.m`; its function returns a rigidBodyTree."""
-    del units
     demand_free(table, "rigidBodyTree")
     poses = frame_poses(table)
     lines = [f"function robot = {identifier(table.robot)}_tree()", *(f"% {line}" for line in header(table))]
@@ -82,9 +80,8 @@ def write_matlab_rst(table: DHTable, units: Units) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_ets(table: DHTable, units: Units) -> str:
+def write_ets(table: DHTable) -> str:
     """Return a module with `ets`, and `robot` of these transforms; raise InputError for a mimic joint."""
-    del units
     demand_free(table, "a sequence of elementary transforms")
     lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
