@@ -6,7 +6,6 @@ A file is written completely or not at all.
 from __future__ import annotations
 
 import io
-import math
 import os
 import sys
 import tempfile
@@ -245,12 +244,3 @@ def check_of_path(check: object | None) -> tuple[str, int]:
 
     by = f"Pinocchio {version()}"
     return (f"NOT VERIFIED by {by}", 3) if check is None else (f"{by}: {check}", 0)
-
-
-def finite(value: Any) -> Any:
-    """Replace infinity and NaN by None, because JSON has neither."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +25,7 @@ from urdfkin.cli.options import (
     together,
     verify_option,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, check_of_path, finite
+from urdfkin.cli.output import TEXTS, Answer, answering, check_of_path
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
@@ -197,6 +196,7 @@ def structure_command(
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
     from urdfkin.dh.structure import opw_of, structure  # noqa: PLC0415  --help stays fast
+    from urdfkin.system.documents import plain  # noqa: PLC0415
     from urdfkin.verify.chain_checks import check_opw, check_screws  # noqa: PLC0415
 
     if opw is not None:
@@ -206,7 +206,7 @@ def structure_command(
         screws = loaded.screws(tip, base, verify=False)
         check = check_screws(loaded.verifier, screws) if verify else None
         found = structure(screws)
-        data = {"json": lambda: finite(asdict(found))}
+        data = {"json": lambda: plain(found)}
         return Answer(lambda: _document(found), data, *check_of_path(check))
     path = loaded.chain(tip, base)
     parameters = opw_of(path, opw / 1e3)

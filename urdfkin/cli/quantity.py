@@ -41,7 +41,7 @@ from urdfkin.cli.options import (
     verify_option,
     with_base,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, check_line, compiling, exit_code, finite
+from urdfkin.cli.output import TEXTS, Answer, answering, check_line, compiling, exit_code
 from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
@@ -556,6 +556,8 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.
     """
+    from urdfkin.system.documents import plain  # noqa: PLC0415  --help stays fast
+
     x = _read()
     with compiling():
         found = x.robot.singular_values(x.q, x.frame, rows, base=x.base)
@@ -590,10 +592,10 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             "q": x.q.tolist(),
             **x.said,
             **{
-                name: {side: finite(numbers.tolist()) for side, numbers in between._asdict().items()}
+                name: plain(between._asdict())
                 for name, between in (*named, ("manipulability", found.manipulability))
             },
-            "manipulability_gradient": finite(gradient.tolist()),
+            "manipulability_gradient": plain(gradient),
             "singularities": [
                 {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
                 if one

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import counted
+from urdfkin.system.documents import plain
 
 #: If (residuals) / (stated noise) is below this number, the residuals are only rounding errors.
 _ROUNDING = 0.5
@@ -114,7 +115,7 @@ def as_data(found: Calibration) -> dict[str, Any]:
                 "unit": parameter.unit or "1",
                 "fitted": k in identification.kept,
                 "moved": float(found.values[k]) if found.fitted is not None else None,
-                "deviation": _finite(found.deviations[k]) if found.fitted is not None else None,
+                "deviation": found.deviations[k] if found.fitted is not None else None,
                 "written": float(found.written_values[k]) if k in found.written_parameters else None,
                 "still_because": identification.still.get(k),
             }
@@ -125,9 +126,9 @@ def as_data(found: Calibration) -> dict[str, Any]:
         return data
     fitted = found.fitted
     names = ("base", found.base), ("tool", found.tool)
-    return data | {
+    data |= {
         "covariance_of": [str(found.parameters[k]) for k in identification.kept],
-        "covariance": [[_finite(x) for x in row] for row in fitted.covariance],
+        "covariance": fitted.covariance,
         "noise": {"metres": fitted.noise.metres, "radians": fitted.noise.radians}
         if found.stated or fitted.is_judged
         else None,
@@ -136,15 +137,12 @@ def as_data(found: Calibration) -> dict[str, Any]:
             for when, fit in (("before", found.before), ("after", fitted), ("as_written", found.written_fit))
             if fit is not None
         },
-        "residuals": fitted.errors.tolist(),
+        "residuals": fitted.errors,
         "odd_poses": list(found.odd),
         "doubts": doubts(found),
         "objections": list(found.plausibility.objections),
         "likeliest_reason": found.plausibility.reason,
-        "placements": {name: T.tolist() for name, T in names if T is not None},
-        "origins": {joint: T.tolist() for joint, T in found.origins.items()},
+        "placements": {name: T for name, T in names if T is not None},
+        "origins": found.origins,
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return cast("dict[str, Any]", plain(data))
