@@ -10,11 +10,6 @@ snapped, from base to tip:
 The positions of joint origins are not changed. Therefore, each change of an angle only rotates the rest of
 the chain about a joint's origin. From these rotations, `urdfkin.dh.table` derives a bound of the effect on
 the tip.
-
-`snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). For example, such
-an angle may cause a tilt of 5e-12 rad. This tilt is larger than rounding errors of the computation
-(`urdfkin.dh.common_normals`). The table therefore contains the tilt, and offsets of about 1e-12 m that the
-tilt causes. The hint says that the file caused the tilt and the offsets.
 """
 
 from __future__ import annotations
@@ -274,10 +269,12 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
     """Return a hint about cells that nearly equal a multiple of 15 degrees or zero, in one line of text.
 
-    The hint names one of these cells. It also recommends a tolerance from `TOLERANCES`: the tolerance after
-    which the fewest cells nearly equal a round value. The result is None if no cell nearly equals a round
-    value, or if no tolerance reduces the number of these cells. `snapped` takes a tolerance (rad), and
-    returns the exact `table` with angles rounded to multiples of 15 degrees.
+    For example, an angle that the file rounds (1.5708) may cause a tilt of 5e-12 rad and offsets of about
+    1e-12 m. They are larger than rounding errors of the computation, so the table contains them. The hint
+    names one of these cells. It also recommends a tolerance from `TOLERANCES`: the tolerance after which the
+    fewest cells nearly equal a round value. The result is None if no cell nearly equals a round value, or if
+    no tolerance reduces the number of these cells. `snapped` takes a tolerance (rad), and returns the exact
+    `table` with angles rounded to multiples of 15 degrees.
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:

@@ -39,7 +39,10 @@ COLUMNS = ("a", "alpha", "d", "theta")
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Format of the numbers in a printed table; exact multiples of pi/12 in radians are fractions of pi."""
+    """Format of the numbers in a printed table, with `digits` significant digits.
+
+    Exact multiples of pi/12 in radians are written as fractions of pi.
+    """
 
     angles: Angles = Angles.RADIANS
     lengths: Lengths = Lengths.METRES

@@ -40,7 +40,7 @@ from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
 #: This is the default tolerance for the tip's position (metres).
-#: The tip error is two thirds of it if one or two cells of a table are rounded to 0.1 mm.
+#: The tip error is two thirds of this tolerance if one or two cells are rounded to 0.1 mm.
 TOLERANCE = 2e-4
 #: The fit uses `FIT_SAMPLES` configurations, and its check uses `CHECK_SAMPLES` other configurations.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200

@@ -1,20 +1,14 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
 An *interpretation* of a table consists of a convention, units and column names. In each interpretation, the
-numbers of a table describe a robot with a different *shape*. The shape of a robot consists of three kinds of
-numbers: the distances of consecutive axes, the angles between them, and the offsets along the axes. A change
-of joint signs, joint offsets, base or tool does not change the shape. The shape is fast to compute.
-Therefore, urdfkin first computes the shape for each interpretation, and compares it with the URDF's shape. It
-then fits only the few interpretations whose shapes are closest to the URDF's shape.
+numbers of a table describe a robot with a different *shape*: the distances of consecutive axes, the angles
+between them, and the offsets along the axes. A change of joint signs, joint offsets, base or tool does not
+change the shape. The shape is fast to compute. Therefore, urdfkin fits only the few interpretations whose
+shapes are closest to the URDF's shape.
 
-`other_readings` changes the convention, units or column names of the table's plain data (`urdfkin.dh.rows`).
-It then parses the data again. The parser rejects an interpretation with an impossible value, such as an angle
-of eighty turns.
-
-`doubts` needs no URDF. The function finds units that look wrong, and two columns that may be exchanged. The
-function uses two facts. First, most angles in the table of an arm are multiples of 30 degrees, and lengths
-hardly ever look like such angles. Second, the length of an arm is between some centimetres and some metres.
-If there is a URDF, `diagnose` decides by a fit.
+`doubts` needs no URDF. The function uses two facts. First, most angles in the table of an arm are multiples
+of 30 degrees, and lengths hardly ever look like such angles. Second, the length of an arm is between some
+centimetres and some metres. If there is a URDF, `diagnose` decides by a fit.
 """
 
 from __future__ import annotations
@@ -243,7 +237,10 @@ def as_said(data: Mapping[str, Any]) -> ConventionHypothesis:
 
 
 def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothesis, DHTable]]:
-    """Yield every other interpretation in which the table is valid, the most similar first."""
+    """Yield every other interpretation in which the parser accepts the table, the most similar first.
+
+    The parser rejects an impossible value, such as an angle of eighty turns.
+    """
     rows = data.get("rows")
     if not isinstance(rows, list) or not all(isinstance(row, (list, Mapping)) for row in rows):
         return
