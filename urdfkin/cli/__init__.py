@@ -254,11 +254,6 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the `urdfkin` command.
-
-    Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but not checked by Pinocchio.
-    70: a defect of urdfkin. 128 + n: stopped by signal n.
-    """
     streams.prepare()
     guard()
     # For small matrices, one thread of OpenBLAS is fastest.

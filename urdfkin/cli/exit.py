@@ -70,7 +70,7 @@ def run(command: click.Command, name: str) -> int:
     """Run a command and return its exit code.
 
     0: done, and verified where possible. 1: a disagreement. 2: bad input or usage. 3: computed, but not
-    checked by Pinocchio. 70: a defect of urdfkin. 130: interrupted.
+    checked by Pinocchio. 70: a defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
     """
     try:
         # In standalone mode, click would exit with 1 after an interrupt.

@@ -344,24 +344,17 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 _POSITION = ("x", "y", "z")
 #: Choices of `placement --as` besides the matrix
 _FORMS = {
-    "rpy": replace(
+    name: replace(
         PLACEMENT,
-        shape=(6,),
-        labels=(*_POSITION, "roll", "pitch", "yaw"),
-        units={"x, y, z": "m", "roll, pitch, yaw": "rad"},
-    ),
-    "quaternion": replace(
-        PLACEMENT,
-        shape=(7,),
-        labels=(*_POSITION, "qx", "qy", "qz", "qw"),
-        units={"x, y, z": "m", "qx, qy, qz, qw": "1"},
-    ),
-    "wxyz": replace(
-        PLACEMENT,
-        shape=(7,),
-        labels=(*_POSITION, "qw", "qx", "qy", "qz"),
-        units={"x, y, z": "m", "qw, qx, qy, qz": "1"},
-    ),
+        shape=(3 + len(names),),
+        labels=(*_POSITION, *names),
+        units={"x, y, z": "m", ", ".join(names): unit},
+    )
+    for name, names, unit in (
+        ("rpy", ("roll", "pitch", "yaw"), "rad"),
+        ("quaternion", ("qx", "qy", "qz", "qw"), "1"),
+        ("wxyz", ("qw", "qx", "qy", "qz"), "1"),
+    )
 }
 
 

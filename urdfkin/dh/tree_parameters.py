@@ -125,10 +125,9 @@ class TreeParameters:
         The result is the larger of the path lengths in the URDF and in the table.
         """
         values = np.abs(self._values(q))
-        own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
-        own = own + np.where([row.sigma == 1 for row in self.rows], values, 0.0)
-        own = own + np.linalg.norm(self.T_frame_link[:, :3, 3], axis=-1)
         slides = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
+        own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
+        own = own + slides + np.linalg.norm(self.T_frame_link[:, :3, 3], axis=-1)
         reach = np.zeros((*q.shape[:-1], len(self.rows)))
         for j in range(len(self.rows)):
             way = self._way(j)

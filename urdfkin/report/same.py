@@ -262,9 +262,7 @@ def as_document(found: Sameness) -> TextDocument:
         parts += [f"{head}: {line}" for line in lines[:SHOWN] if line]
         parts += [f"... and {len(lines) - SHOWN} more lines"] if len(lines) > SHOWN else []
     if frames := far_frames(found):
-        parts += [
-            f"{farthest(found)}:", Table(HEADS, rows(frames[:SHOWN])),
-        ]  # fmt: skip
+        parts += [f"{farthest(found)}:", Table(HEADS, rows(frames[:SHOWN]))]
         parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
         if off := attained(frames[0]):
             parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
