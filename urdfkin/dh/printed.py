@@ -39,11 +39,10 @@ class PrintedPrecision:
     samples: int
 
     def __str__(self) -> str:
-        proven = "" if self.bound is None else f", and proven within {at_most(self.bound)} m"
+        proven = "" if self.bound is None else f"; the proven bound is {at_most(self.bound)} m"
         return (
             f"printed with {self.digits} digits, the table gives the tip within {at_most(self.metres)} m"
-            " of its"
-            f" exact position on {self.samples} samples{proven}"
+            f" of its exact position on {self.samples} samples{proven}"
         )
 
 

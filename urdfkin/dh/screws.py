@@ -328,7 +328,7 @@ def screws_from(
         size = float(np.linalg.norm(S[i, :3] if turns else S[i, 3:]))
         if abs(size - 1.0) > _WRITTEN:
             raise InputError(
-                "the axis w of a screw must have length 1",
+                f"the axis {'w' if turns else 'v'} of a screw must have length 1",
                 where=f"screw {i + 1}",
                 found=f"{size:.6g}",
                 remedy="write a screw as (w, v), angular part first",

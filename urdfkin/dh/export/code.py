@@ -66,7 +66,7 @@ def demand_free(table: DHTable, what: str) -> None:
         raise InputError(
             f"{what} does not support mimic joints",
             where=f"table of {table.robot}",
-            remedy="load the robot with mimic off, or use another format, such as numpy or matlab",
+            remedy="load the robot with --no-mimic (mimic=False), or use another format, such as numpy",
         )
 
 
