@@ -524,7 +524,6 @@ _MJCF = (".xml", ".mjcf")
 
 
 def _is_other(file: str) -> bool:
-    """Return whether a file is USD or MJCF."""
     if is_usd(file):
         return True
     if Path(file).suffix.lower() not in _MJCF:

@@ -148,7 +148,6 @@ class SafeStream:
         return len(text)
 
     def write_commands(self, text: str) -> None:
-        """Write commands for a CI service."""
         self._pass(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
 
     def write_file(self, text: str) -> None:

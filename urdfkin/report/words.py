@@ -55,7 +55,7 @@ def units(value: Units, *, compared: bool = True) -> str:
 
 
 def percent(share: Units) -> str:
-    """Format the ratio of a disagreement to its bound: below 10 as a percentage, then as a factor."""
+    """Format the ratio of a disagreement to its bound: as a percentage below 10, otherwise as a factor."""
     if share is None:
         return "inf"
     return f"{share:.1%}" if share < 10.0 else f"{share:.2g} x"
@@ -86,7 +86,7 @@ def in_order(robot: Robot) -> list[Check]:
 
 
 def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
-    """Return each heading of the table of robots with its quantities; an unknown quantity has its own."""
+    """Return each heading of the table of robots with its quantities; an unknown one has its own heading."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].head if name in QUANTITIES else name
