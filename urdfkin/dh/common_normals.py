@@ -90,15 +90,8 @@ class Step:
     def turned(self) -> Step:
         """Return the numbers for the same two axes and the opposite direction of x."""
         alpha = math.pi if self.alpha == math.pi else -self.alpha
-        return Step(
-            self.phi + math.pi,
-            self.delta,
-            -self.a,
-            alpha,
-            -self.beta,
-            self.phi_next - math.pi,
-            self.delta_next,
-        )
+        phi, phi_next = self.phi + math.pi, self.phi_next - math.pi
+        return replace(self, phi=phi, a=-self.a, alpha=alpha, beta=-self.beta, phi_next=phi_next, free=False)
 
 
 def lifted(A: FloatArray, carry: float) -> FloatArray:

@@ -173,18 +173,9 @@ def _table(
 
 def _row(joint: ChainJoint, turn: tuple[float, float], step: Step, sense: int) -> DHRow:
     theta, d = turn
-    return DHRow(
-        step.a + 0.0,
-        step.alpha + 0.0,
-        d + 0.0,
-        theta + 0.0,
-        joint.kind,
-        joint.name,
-        sense,
-        step.beta + 0.0,
-        joint.mimic,
-        joint.limit,
-    )
+    # The sum with 0.0 makes a negative zero positive.
+    a, alpha, d, theta, beta = (x + 0.0 for x in (step.a, step.alpha, d, theta, step.beta))
+    return DHRow(a, alpha, d, theta, joint.kind, joint.name, sense, beta, joint.mimic, joint.limit)
 
 
 # -- before the pass -----------------------------------------------------------------------------------

@@ -76,15 +76,8 @@ def _row(row: DHRow, units: Units) -> DHRow:
     )
     if rule is not None:
         rule = replace(rule, multiplier=float(f"{rule.multiplier:.10g}"))
-    return replace(
-        row,
-        a=_length(a, units),
-        alpha=_angle(alpha, units),
-        d=d,
-        theta=theta,
-        beta=_angle(beta, units),
-        mimic=rule,
-    )
+    a, alpha, beta = _length(a, units), _angle(alpha, units), _angle(beta, units)
+    return replace(row, a=a, alpha=alpha, d=d, theta=theta, beta=beta, mimic=rule)
 
 
 def _angle(radians: float, units: Units) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, cast
 
 from urdfkin.comparison.diff import Change, Changes, motion_words, word
 from urdfkin.comparison.result import angle, length
@@ -12,6 +12,7 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import counted
+from urdfkin.system.documents import plain
 
 #: Titles of the columns
 HEADS = ("element", "what", "old", "new", "alone")
@@ -108,10 +109,9 @@ def as_data(found: Changes) -> dict[str, Any]:
     def far(interval: Any) -> dict[str, Any] | None:
         if interval is None:
             return None
-        upper = None if interval.upper == float("inf") else interval.upper
-        return {"frame": interval.frame, "lower": interval.lower, "upper": upper}
+        return {"frame": interval.frame, "lower": interval.lower, "upper": interval.upper}
 
-    return {
+    data = {
         "sources": list(found.sources),
         "changes": [
             {
@@ -126,9 +126,6 @@ def as_data(found: Changes) -> dict[str, Any]:
         ],
         "effects": [{"element": e.element, **(far(e.interval) or {})} for e in found.effects],
         "total": far(found.total),
-        "rounding": found.rounding
-        and {
-            name: size if isfinite(size) else None
-            for name, size in zip(("metres", "radians"), found.rounding, strict=True)
-        },
+        "rounding": found.rounding and dict(zip(("metres", "radians"), found.rounding, strict=True)),
     }
+    return cast("dict[str, Any]", plain(data))

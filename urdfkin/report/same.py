@@ -117,14 +117,9 @@ def _off(frame: Interval, rounding: tuple[float, float]) -> str:
 
 def far_frames(found: Sameness) -> list[Interval]:
     """Return the frames whose bound exceeds rounding, the frame with the largest bound first."""
-    return sorted(
-        (
-            frame
-            for frame in found.frames
-            if frame.upper > found.rounding[0] or frame.radians > found.rounding[1]
-        ),
-        key=lambda frame: (-frame.upper, -frame.lower),
-    )
+    metres, radians = found.rounding
+    far = [frame for frame in found.frames if frame.upper > metres or frame.radians > radians]
+    return sorted(far, key=lambda frame: (-frame.upper, -frame.lower))
 
 
 def farthest(found: Sameness) -> str:

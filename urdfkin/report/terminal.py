@@ -146,14 +146,8 @@ def _print_checks(robot: Robot, out: Console) -> None:
 
 def _judged(judgement: Judgement) -> Table:
     """Return the errors of the accuracy study, with a row for each quantity and reference frame."""
-    heads = [
-        "quantity, reference",
-        "numbers",
-        "worst\nurdfkin",
-        "\nPinocchio",
-        "typical\nurdfkin",
-        "\nPinocchio",
-    ]
+    heads = ["quantity, reference", "numbers", "worst\nurdfkin", "\nPinocchio"]
+    heads += ["typical\nurdfkin", "\nPinocchio", "smaller\nerror"]
     rows = (
         [
             line["quantity"] + (f", {line['reference']}" if line["reference"] else ""),
@@ -164,7 +158,7 @@ def _judged(judgement: Judgement) -> Table:
         ]
         for line in judgement["lines"]
     )
-    return Table([*heads, "smaller\nerror"], list(rows))
+    return Table(heads, list(rows))
 
 
 def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:

@@ -288,21 +288,12 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTabl
     """Return the fitted reference table, with the joint names and limits of the URDF."""
     rows = []
     for i, (row, joint) in enumerate(zip(standard.rows, chain.joints, strict=True)):
-        rows.append(
-            replace(
-                row,
-                theta=float(fitted.cells[i, 0]),
-                d=float(fitted.cells[i, 1]),
-                sense=int(fitted.senses[i]),
-                joint=joint.name,
-                kind=joint.kind if joint.kind is not JointKind.FIXED else row.kind,
-                mimic=joint.mimic,
-                limit=joint.limit,
-            )
-        )
-    return DHTable(
-        Convention.STANDARD, tuple(rows), fitted.base, fitted.tool, chain.robot, chain.base, chain.tip
-    )
+        theta, d = fitted.cells[i, :2].tolist()
+        of_joint = {name: getattr(joint, name) for name in ("kind", "mimic", "limit")}
+        sense = int(fitted.senses[i])
+        rows.append(replace(row, theta=theta, d=d, sense=sense, joint=joint.name, **of_joint))
+    ends = fitted.base, fitted.tool, chain.robot, chain.base, chain.tip
+    return DHTable(Convention.STANDARD, tuple(rows), *ends)
 
 
 def max_tip_error_bound(

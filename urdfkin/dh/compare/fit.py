@@ -566,17 +566,9 @@ def _extend(
         base = candidate.base
         if i == 0:  # The base contains the first row's offset.
             base, offset = along_axis(step.phi - row.theta, step.delta - row.d), 0.0
-        found.append(
-            _Partial(
-                cost,
-                (*candidate.senses, sense),
-                (*candidate.offsets, offset),
-                step.phi_next,
-                step.delta_next,
-                base,
-                _absorber(candidate, step, i, turns[i]),
-            )
-        )
+        senses, offsets = (*candidate.senses, sense), (*candidate.offsets, offset)
+        absorber = _absorber(candidate, step, i, turns[i])
+        found.append(_Partial(cost, senses, offsets, step.phi_next, step.delta_next, base, absorber))
     return found
 
 

@@ -48,14 +48,8 @@ def to_mapping(table: DHTable) -> dict[str, Any]:
 
 
 def _row(row: DHRow) -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "joint": row.joint,
-        "kind": row.kind.value,
-        "a": row.a,
-        "alpha": row.alpha,
-        "d": row.d,
-        "theta": row.theta,
-    }
+    data: dict[str, Any] = {"joint": row.joint, "kind": row.kind.value}
+    data |= {name: getattr(row, name) for name in ("a", "alpha", "d", "theta")}
     if row.beta:
         data["beta"] = row.beta
     if row.sense != 1:

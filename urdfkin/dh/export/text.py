@@ -209,25 +209,12 @@ def write_latex(table: DHTable, units: Units) -> str:
         texts = [maths(text) for text in cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")]
         rows.append([str(i), latex_text(row.joint), *texts])
     poses = {what: T for what, T in (("Base", table.base), ("Tool", table.tool)) if not is_identity(T)}
-    lines = [
-        r"\begin{table}",
-        r"  \centering",
-        f"  \\caption{{{_caption(table)}}}",
-        *fitted(
-            [
-                rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}",
-                r"  \toprule",
-                f"  {' & '.join(heads)} \\\\",
-                r"  \midrule",
-                *(f"  {' & '.join(row)} \\\\" for row in rows),
-                r"  \bottomrule",
-                r"\end{tabular}",
-            ]
-        ),
-        *(line for what, T in poses.items() for line in pose(what, T)),
-        r"\end{table}",
-    ]
-    return "\n".join(lines) + "\n"
+    frame = [rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}", r"  \toprule"]
+    frame += [f"  {' & '.join(heads)} \\\\", r"  \midrule", *(f"  {' & '.join(row)} \\\\" for row in rows)]
+    frame += [r"  \bottomrule", r"\end{tabular}"]
+    lines = [r"\begin{table}", r"  \centering", f"  \\caption{{{_caption(table)}}}", *fitted(frame)]
+    lines += [line for what, T in poses.items() for line in pose(what, T)]
+    return "\n".join([*lines, r"\end{table}"]) + "\n"
 
 
 def _caption(table: DHTable) -> str:
