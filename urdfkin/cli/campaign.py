@@ -137,13 +137,8 @@ def _bar(pace: Pace) -> Iterator[Progress]:
         def tell(state: CampaignProgress) -> None:
             pace_ = _speed(state, pace)
             words = f"{state.robots_done}/{state.robots} robots, {pace_}{_failures(state)},"
-            bar.update(
-                task,
-                completed=state.chunks_done,
-                total=state.chunks,
-                description=printable(state.label),
-                words=words,
-            )
+            done, label = state.chunks_done, printable(state.label)
+            bar.update(task, completed=done, total=state.chunks, description=label, words=words)
 
         yield tell
 

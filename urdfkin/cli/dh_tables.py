@@ -114,10 +114,9 @@ def _tables(work: Work) -> Answer:
     verifier = work.robot.verifier
     tables = [_make_table(work, tip, work.snap) for tip in tips]
     made = [(table, verifier.table(table) if verifier.policy else None) for table in tables]
-    if work.format_ == "json" and work.all_:
-        text = json.dumps([_document(table, check) for table, check in made], indent=2) + "\n"
-    elif work.format_ == "json":
-        text = json.dumps(_document(*made[0]), indent=2) + "\n"
+    if work.format_ == "json":
+        documents = [_document(table, check) for table, check in made]
+        text = json.dumps(documents if work.all_ else documents[0], indent=2) + "\n"
     else:
         text = "\n".join(_format_table(work, table, check) for table, check in made)
     if work.format_ not in (*_PRINTED, "json"):
@@ -143,15 +142,8 @@ def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
         )
     if base is None and work.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
-    return robot.dh(
-        tip,
-        base,
-        work.convention or (like.convention if like else "standard"),
-        snap=snap,
-        like=like,
-        verify=False,
-        **work.choices,
-    )
+    convention = work.convention or (like.convention if like else "standard")
+    return robot.dh(tip, base, convention, snap=snap, like=like, verify=False, **work.choices)
 
 
 def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:

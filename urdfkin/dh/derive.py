@@ -209,15 +209,8 @@ def _use_freedom_of_prismatic_axes(
     n = len(slides)
     minimal = choices.slide is Slide.MINIMAL
     moved = [slides[k] and minimal and _onto_neighbour(constants, k, slides) for k in range(n)]
-    moved = [
-        moved[k]
-        or (
-            slides[k]
-            and choices.near_parallel is NearParallel.STRICT
-            and _meets_neighbour(constants, k, noise)
-        )
-        for k in range(n)
-    ]
+    strict = choices.near_parallel is NearParallel.STRICT
+    moved = [moved[k] or (slides[k] and strict and _meets_neighbour(constants, k, noise)) for k in range(n)]
     if slides[0] and not moved[0]:
         _shift_after(constants, 0, constants[0][:3, :3].T @ constants[0][:3, 3])
         moved[0] = True

@@ -262,9 +262,9 @@ def check_rows(robot: Robot) -> list[dict[str, Any]]:
             "p99": units(check["p99"]),
             "worst": units(check["worst"]),
             "share": percent(check["share_of_bound"]),
-            "width": min(100.0, 100.0 * (check["share_of_bound"] or 0.0))
-            if check["share_of_bound"] is not None
-            else 100.0,
+            "width": 100.0
+            if check["share_of_bound"] is None
+            else min(100.0, 100.0 * check["share_of_bound"]),
             "case": check["worst_case"],
             "where": "" if check["worst_case"] is None else check["worst_case"]["frame"],
         }

@@ -365,12 +365,8 @@ def starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -
 
 
 def _start(standard: DHTable, aligned: Alignment) -> Model:
-    start = replace(
-        as_written(standard),
-        senses=np.array(aligned.senses, dtype=np.float64),
-        base=aligned.base,
-        tool=aligned.tool,
-    )
+    senses = np.array(aligned.senses, dtype=np.float64)
+    start = replace(as_written(standard), senses=senses, base=aligned.base, tool=aligned.tool)
     for i, offset in enumerate(aligned.offsets):
         start.cells[i, start.own(i)] += offset
     return start
