@@ -265,13 +265,12 @@ class PairLike:
     def cut(self) -> float | None:
         """Distance (metres) along the first axis from the joint's frame to the x axis of the Hayati row.
 
-        This x axis lies in a plane normal to the first axis.
-
-        The next axis intersects the plane in a point. In the other table, the cell a is the distance of this
-        point from the first axis. The component of a in the direction of the tilt determines the position of
-        the plane. The position error is then the rounding error divided by the tilt. For a slight tilt,
-        urdfkin computes this component from a and from the component normal to the tilt. This formula is then
-        more accurate. The result is None if the plane is farther away than `reach`.
+        This x axis lies in a plane normal to the first axis. The next axis intersects the plane in a point.
+        In the other table, the cell a is the distance of this point from the first axis. The component of a
+        in the direction of the tilt determines the position of the plane. The position error is then the
+        rounding error divided by the tilt. For a slight tilt, urdfkin computes this component from a and from
+        the component normal to the tilt, which is more accurate. The result is None if the plane is farther
+        away than `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)

@@ -288,15 +288,10 @@ def screws_from(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
-    Args:
-        screws: (n, 6) one row (w, v) for each joint, with the angular part first. An array (6, n) with one
-            column for each joint, as in Modern Robotics, is also accepted if n is not six.
-        M: (4, 4) or (3, 4) pose of the tip in the zero configuration (metres).
-        frame: Frame of the screws: "space" is the base frame, and "body" is the tip frame.
-        joints: The joints' names; joint_1, joint_2, ... by default.
-        robot: The robot's name.
-        base_frame: Name of the base frame.
-        tip_frame: Name of the tip frame.
+    `screws` (n, 6) has a row (w, v) for each joint, with the angular part first. An array (6, n) with a
+    column for each joint, as in Modern Robotics, is also accepted if n is not six. `M`, (4, 4) or (3, 4), is
+    the pose of the tip in the zero configuration (metres). The screws are in the base frame (`frame` is
+    "space") or in the tip frame ("body"). By default, the joints are called joint_1, joint_2, ...
 
     Raises:
         InputError: an array has a wrong shape, the length of an axis is not 1, or a screw has a pitch (w . v

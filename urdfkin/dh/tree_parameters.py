@@ -92,9 +92,8 @@ class TreeParameters:
             offsets.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row. The frame of
             a row has z along the joint's axis and x along the common normal.
-        left_out: Tilts that are not larger than rounding errors are replaced by zero
-            (`urdfkin.dh.common_normals`). For each path from the root, these tilts are added. This attribute
-            is the largest sum (rad).
+        left_out: Largest sum (rad), over the paths from the root, of the tilts that are replaced by zero
+            because they are not larger than rounding errors (`urdfkin.dh.common_normals`).
     """
 
     robot: str
@@ -113,8 +112,8 @@ class TreeParameters:
     def roundings(self) -> float:
         """Estimated rounding error of the poses on the longest path, in eps * reach.
 
-        All errors measured so far are smaller than this estimate. It is not a proven bound. It does not
-        include Pinocchio's rounding errors.
+        All errors measured so far are smaller than this estimate. The estimate is not a proven bound, and
+        does not include Pinocchio's rounding errors.
         """
         deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + deepest) + self.left_out / EPS

@@ -108,8 +108,7 @@ class Mistake:
         cell: The changed cell; None if rows are exchanged.
         table: The table after the change.
         fitted: The parameters that must still be fitted after the change.
-        metres: Largest position error of the tip on the samples after the change.
-        radians: Largest orientation error of the tip on the samples after the change.
+        metres, radians: Largest errors of the tip on the samples after the change.
     """
 
     kind: MistakeKind
@@ -134,14 +133,10 @@ class Comparison:
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
         offsets: Offset of each joint (radians or metres).
-        metres: Largest position error of the fitted table's tip in all sampled configurations.
-        radians: Largest orientation error of the fitted table's tip in all sampled configurations.
-        most_metres: Proven upper bound of the tip's position error for all joint values and the fitted table.
-            The bound does not include rounding errors (`urdfkin.dh.compare.agreement`).
-        most_radians: Proven upper bound of the tip's orientation error for all joint values and the fitted
-            table. The bound does not include rounding errors.
-        written_metres: Largest position error of the unfitted table's tip in all sampled configurations.
-        written_radians: Largest orientation error of the unfitted table's tip in all sampled configurations.
+        metres, radians: Largest errors of the fitted table's tip on the samples.
+        most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all joint
+            values. The bounds do not include rounding errors (`urdfkin.dh.compare.agreement`).
+        written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not

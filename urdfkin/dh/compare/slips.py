@@ -48,8 +48,7 @@ class CommonMistake:
     Attributes:
         reading: The interpretation with which the table agrees with the URDF.
         said: The interpretation that the table's file states.
-        metres: Largest position error of the tip on the samples, after a fit of base, tool and offsets.
-        radians: Largest orientation error of the tip on the samples, after this fit.
+        metres, radians: Largest errors of the tip on the samples, after a fit of base, tool and offsets.
     """
 
     reading: ConventionHypothesis
