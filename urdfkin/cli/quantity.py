@@ -342,7 +342,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 # -- commands with options of their own --------------------------------------------------------------
 
 _POSITION = ("x", "y", "z")
-#: Choices of `placement --as` besides the matrix
+#: Choices of `placement --as` except matrix
 _FORMS = {
     name: replace(
         PLACEMENT,

@@ -29,7 +29,7 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: Largest tolerance (rad): 5 degrees.
+#: The largest tolerance is 5 degrees (in rad).
 #: With more than 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
 #: A snapped table is compared with the exact chain at this number of configurations.
@@ -244,7 +244,7 @@ def travel(limit: Limit | None) -> float:
 #: `noisy_cells` finds angles that differ by at most this number (rad) from a multiple of 15 degrees.
 #: It finds lengths of at most this number times the table's span.
 LARGEST = 1e-4
-#: Tolerances (rad) that `snap_hint` tries, in ascending order.
+#: `snap_hint` tries these tolerances (rad) in ascending order.
 TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 

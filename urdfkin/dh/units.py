@@ -156,7 +156,7 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     return number if units.angles is Angles.RADIANS else in_radians(number)
 
 
-#: Characters that occur in web pages, PDFs and LaTeX, each with the equivalent plain text.
+#: These characters occur in web pages, PDFs and LaTeX; each has an equivalent plain text.
 _SAME = str.maketrans(
     {
         **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),

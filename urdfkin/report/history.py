@@ -112,7 +112,7 @@ HISTORY = Layout(
 )
 
 
-#: Changes of each source, with their runs
+#: Changes of each source
 Told = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 

@@ -285,7 +285,7 @@ def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 _PATIENCE = 4
 #: A fit ends at this mean error, relative to the reach.
 _ROUNDING = 1e-13
-#: Arguments `count` and `beam` of `align` for a fast fit.
+#: A fast fit calls `align` with these arguments `count` and `beam`.
 HASTY = (3, 16)
 #: The search ends at this tip error, relative to the reach, because such an error is only rounding.
 _AT_ROUNDING = 1e-12
