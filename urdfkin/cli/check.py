@@ -159,10 +159,6 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
         say(f"{file}: fixed {code} {RULES[code].slug}, {where}{moved}", err=True)
 
 
-def difference(file: str, before: bytes, after: bytes) -> str:
-    return patch(file, before, after, harmless)
-
-
 _SETTINGS = "urdfkin.settings"
 #: These settings in pyproject.toml are the defaults of the options with the same names.
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
@@ -491,7 +487,7 @@ class Run:
             say(f"{file}: {code} is not fixed: {objection}", err=True)
         if self.diff:
             self.outcome.to_fix += len(mended.fixed)
-            self.outcome.patches.append(difference(file, text.data, mended.text.data))
+            self.outcome.patches.append(patch(file, text.data, mended.text.data, harmless))
             chosen = choose()
             self.outcome.unsafe += sum(
                 chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe

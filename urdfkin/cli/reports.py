@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,10 +21,6 @@ from urdfkin.system.files import is_folder
 if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
-
-#: These are the paths and contents of the files of a report in one format.
-#: An HTML report can have a page and a folder of other files.
-Files = Iterator[tuple[Path, bytes]]
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
 
@@ -48,9 +44,8 @@ def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
     The result is 0, or the exit code of the first format that could not be written. Its error has been
     printed.
     """
-    forms = {"json_": _json, "html": _html, "junit": _junit, "markdown": _markdown}
-    codes = (_write(path, forms[name], document) for name in FILES if (path := files[name]) is not None)
-    return next(filter(None, list(codes)), 0)
+    codes = [_write(document, name, path) for name in FILES if (path := files[name]) is not None]
+    return next(filter(None, codes), 0)
 
 
 def say_written(files: Mapping[str, Path | None]) -> None:
@@ -58,9 +53,9 @@ def say_written(files: Mapping[str, Path | None]) -> None:
         say(f"wrote {', '.join(named)}")
 
 
-def _write(path: Path, form: Callable[[Document, Path], Files], document: Document) -> int:
+def _write(document: Document, form: str, path: Path) -> int:
     try:
-        for place, data in form(document, path):
+        for place, data in _files(document, form, path):
             if place.parent != path.parent:
                 place.parent.mkdir(exist_ok=True)
             write_file(place, data)
@@ -73,26 +68,22 @@ def _write(path: Path, form: Callable[[Document, Path], Files], document: Docume
     return 0
 
 
-def _json(document: Document, path: Path) -> Files:
-    yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
+def _files(document: Document, form: str, path: Path) -> Iterator[tuple[Path, bytes]]:
+    """Yield the path and the content of each file of a report; HTML can have a page and other files."""
+    if form == "json_":
+        yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
+    elif form == "junit":
+        from urdfkin.report.junit import as_junit  # noqa: PLC0415
 
+        yield path, as_junit(document)
+    elif form == "markdown":
+        from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
 
-def _html(document: Document, path: Path) -> Files:
-    from urdfkin.report.html import as_files  # noqa: PLC0415  this module draws plots
+        yield path, as_markdown(document).encode()
+    else:
+        from urdfkin.report.html import as_files  # noqa: PLC0415  this module draws plots
 
-    return ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
-
-
-def _junit(document: Document, path: Path) -> Files:
-    from urdfkin.report.junit import as_junit  # noqa: PLC0415
-
-    yield path, as_junit(document)
-
-
-def _markdown(document: Document, path: Path) -> Files:
-    from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
-
-    yield path, as_markdown(document).encode()
+        yield from ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
 
 
 EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
