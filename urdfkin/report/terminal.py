@@ -83,16 +83,16 @@ def _counts(robot: Robot) -> list[str]:
 def _print_wide(robots: Sequence[Robot], out: Console) -> None:
     quantities_of = columns(robots)
     heads = ["robot", "joints", "frames", "results", *quantities_of, "verdict"]
-    rows = (
+    rows = [
         [*_counts(robot), *(worst_of(robot, names) for names in quantities_of.values()), robot["verdict"]]
         for robot in robots
-    )
-    print_table(out, Table(heads, list(rows), left=(0, len(heads) - 1)))
+    ]
+    print_table(out, Table(heads, rows, left=(0, len(heads) - 1)))
 
 
 def _print_robots(robots: Sequence[Robot], out: Console) -> None:
     heads = ["robot", "joints", "frames", "results", "worst", "of bound", "verdict"]
-    rows = (
+    rows = [
         [
             *_counts(robot),
             units(worst(check["worst"] for check in robot["checks"]), compared=bool(robot["checks"])),
@@ -100,8 +100,8 @@ def _print_robots(robots: Sequence[Robot], out: Console) -> None:
             robot["verdict"],
         ]
         for robot in robots
-    )
-    print_table(out, Table(heads, list(rows), left=(0, 6)))
+    ]
+    print_table(out, Table(heads, rows, left=(0, 6)))
 
 
 def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
@@ -121,14 +121,14 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
 
 
 def _three_sides(robots: Sequence[Robot], title: str) -> Table:
-    rows = ([quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title))
+    rows = [[quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title)]
     heads = [head.replace(", ", ",\n") for head in second_oracle_heads(title)]
-    return Table(["quantity", *heads], list(rows), left=(0, 5))
+    return Table(["quantity", *heads], rows, left=(0, 5))
 
 
 def _print_checks(robot: Robot, out: Console) -> None:
     heads = ["quantity, reference", "results", "outside", "median", "99 %", "worst", "of bound"]
-    rows = (
+    rows = [
         [
             check_name(check),
             f"{check['results']:,}",
@@ -139,16 +139,16 @@ def _print_checks(robot: Robot, out: Console) -> None:
             percent(check["share_of_bound"]),
         ]
         for check in in_order(robot)
-    )
+    ]
     out.print(robot["source"], style="bold")
-    print_table(out, Table(heads, list(rows)))
+    print_table(out, Table(heads, rows))
 
 
 def _judged(judgement: Judgement) -> Table:
     """Return the errors of the accuracy study, with a row for each quantity and reference frame."""
     heads = ["quantity, reference", "numbers", "worst\nurdfkin", "\nPinocchio"]
     heads += ["typical\nurdfkin", "\nPinocchio", "smaller\nerror"]
-    rows = (
+    rows = [
         [
             line["quantity"] + (f", {line['reference']}" if line["reference"] else ""),
             f"{line['numbers']:,}",
@@ -157,8 +157,8 @@ def _judged(judgement: Judgement) -> Table:
             nearer(line),
         ]
         for line in judgement["lines"]
-    )
-    return Table(heads, list(rows))
+    ]
+    return Table(heads, rows)
 
 
 def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
