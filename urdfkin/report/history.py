@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.report.compare import Change, ChangeEntry, by_source, compare, renamed_files
-from urdfkin.report.html import as_is, asset, environment, when
+from urdfkin.report.html import rendered, when
 from urdfkin.report.reading import checked, stored_document
 from urdfkin.report.words import VERDICTS, counted, percent, share_of, units, worst
 from urdfkin.system.documents import Count, Header, Layout, Sha256, parse_json, plain, says
@@ -419,31 +419,27 @@ def _date(run: Run) -> str:
 def as_html(found: History, command: str | None = None) -> str:
     """Return a page with charts and the history of each robot. The template escapes all names."""
     told = _by_robot(found)
-    return (
-        environment()
-        .get_template("history.html.j2")
-        .render(
-            headline=headline(found),
-            runs=found.runs,
-            last=found.runs[-1],
-            dates=[_date(run) for run in found.runs],
-            when=when(found.runs[-1]["started"]),
-            charted=range(max(0, len(found.runs) - CHARTED), len(found.runs)),
-            stacks=_stacks(found),
-            height=_height,
-            robots=[_robot(found, robot, points, told) for robot, points in found.robots.items()],
-            changes=changes(found)[:SHOWN],
-            total=len(changes(found)),
-            unusable=found.unusable,
-            repeated=found.repeated,
-            marks=MARKS,
-            listed=_LISTED,
-            units=units,
-            share=_share,
-            command=command,
-            versions=versions(),
-            style=as_is(asset("report.css")),
-        )
+    return rendered(
+        "history.html.j2",
+        headline=headline(found),
+        runs=found.runs,
+        last=found.runs[-1],
+        dates=[_date(run) for run in found.runs],
+        when=when(found.runs[-1]["started"]),
+        charted=range(max(0, len(found.runs) - CHARTED), len(found.runs)),
+        stacks=_stacks(found),
+        height=_height,
+        robots=[_robot(found, robot, points, told) for robot, points in found.robots.items()],
+        changes=changes(found)[:SHOWN],
+        total=len(changes(found)),
+        unusable=found.unusable,
+        repeated=found.repeated,
+        marks=MARKS,
+        listed=_LISTED,
+        units=units,
+        share=_share,
+        command=command,
+        versions=versions(),
     )
 
 

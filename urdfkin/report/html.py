@@ -76,6 +76,11 @@ def environment() -> Environment:
     return environment
 
 
+def rendered(template: str, **values: Any) -> str:
+    """Return a page with the common style sheet."""
+    return environment().get_template(template).render(style=as_is(asset("report.css")), **values)
+
+
 def asset(name: str) -> str:
     return resources.files("urdfkin.report").joinpath("assets", name).read_text(encoding="utf-8")
 
@@ -131,33 +136,29 @@ def _details(robot: dict[str, Any], document: Document) -> str:
 
 def _page(document: Document, robots: list[dict[str, Any]], token: str = "", folder: str = "") -> str:
     quantities = columns(document["robots"])
-    return (
-        environment()
-        .get_template("report.html.j2")
-        .render(
-            document=document,
-            outcome=outcome_of(document),
-            summary=summary(document),
-            when=when(document["started"]),
-            pinocchio=pinocchio(document),
-            compared=compared(),
-            not_compared=not_compared(),
-            totals=_totals(document),
-            model=_model_verdict(document),
-            verdicts=verdict_counts(document),
-            quantities=list(quantities),
-            overview=[pages.overview(robot, list(quantities.values())) for robot in document["robots"]],
-            robots=robots,
-            opened=len(robots) <= _OPEN,
-            heat_steps=pages.HEAT_STEPS,
-            token=token,
-            folder=folder,
-            style=as_is(asset("report.css")),
-            script=as_is(asset("report.js")),
-            view_script=as_is(asset("view3d.js")),
-            three=as_is(asset("three.min.js")),
-            three_licence=asset("three.LICENSE.txt"),
-        )
+    return rendered(
+        "report.html.j2",
+        document=document,
+        outcome=outcome_of(document),
+        summary=summary(document),
+        when=when(document["started"]),
+        pinocchio=pinocchio(document),
+        compared=compared(),
+        not_compared=not_compared(),
+        totals=_totals(document),
+        model=_model_verdict(document),
+        verdicts=verdict_counts(document),
+        quantities=list(quantities),
+        overview=[pages.overview(robot, list(quantities.values())) for robot in document["robots"]],
+        robots=robots,
+        opened=len(robots) <= _OPEN,
+        heat_steps=pages.HEAT_STEPS,
+        token=token,
+        folder=folder,
+        script=as_is(asset("report.js")),
+        view_script=as_is(asset("view3d.js")),
+        three=as_is(asset("three.min.js")),
+        three_licence=asset("three.LICENSE.txt"),
     )
 
 

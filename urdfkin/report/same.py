@@ -334,38 +334,34 @@ def as_html(
 
     `options` are other options of the command line on the page. `started` is the date and time on the page.
     """
-    from urdfkin.report.html import as_is, asset, environment, when  # noqa: PLC0415  this module loads Jinja
+    from urdfkin.report.html import rendered, when  # noqa: PLC0415  this module loads Jinja
     from urdfkin.verify.oracles import versions  # noqa: PLC0415
 
     moment = started or datetime.now(UTC)
     frames = far_frames(found)
     written = question.within is not None and found.as_written is not None
     worst = found.as_written if written else frames[0] if frames and frames[0].q_a else None
-    return (
-        environment()
-        .get_template("same.html.j2")
-        .render(
-            found=found,
-            headline=headline(found, question),
-            good=found.holds(question),
-            narrowed=found.narrowed,
-            narrowed_head=NARROWED.capitalize(),
-            started=moment.isoformat(timespec="seconds"),
-            when=when(moment.isoformat(timespec="seconds")),
-            versions=versions(),
-            command=command_of(robots, question, options),
-            heads=HEADS,
-            farthest=farthest(found),
-            frames=rows(frames),
-            as_written=as_written(found),
-            renamed=renamed(found),
-            where=where(found, worst) if worst else "",
-            pictures=pictures(found, robots, worst, written=written),
-            title=f"Where {worst.frame} is {attained(worst)} off{' without changes of B' if written else ''}"
-            if worst and attained(worst)
-            else "Both robots in the zero configuration",
-            style=as_is(asset("report.css")),
-        )
+    return rendered(
+        "same.html.j2",
+        found=found,
+        headline=headline(found, question),
+        good=found.holds(question),
+        narrowed=found.narrowed,
+        narrowed_head=NARROWED.capitalize(),
+        started=moment.isoformat(timespec="seconds"),
+        when=when(moment.isoformat(timespec="seconds")),
+        versions=versions(),
+        command=command_of(robots, question, options),
+        heads=HEADS,
+        farthest=farthest(found),
+        frames=rows(frames),
+        as_written=as_written(found),
+        renamed=renamed(found),
+        where=where(found, worst) if worst else "",
+        pictures=pictures(found, robots, worst, written=written),
+        title=f"Where {worst.frame} is {attained(worst)} off{' without changes of B' if written else ''}"
+        if worst and attained(worst)
+        else "Both robots in the zero configuration",
     )
 
 
