@@ -23,101 +23,74 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Each command has its module and a summary, under a heading of the help page.
+#: Each command has its module in `urdfkin.cli` and a summary, under a heading of the help page.
 #: The function of the only command in a module is called `command`; otherwise it is called `NAME_command`.
 #: `groups` adds the commands of `verify/quantities.py`, for example `jacobian`, to the heading `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
-        "robots": ("urdfkin.cli.robots", "List the robots of the catalogue, which are loaded by name."),
-        "info": (
-            "urdfkin.cli.robots",
-            "Show the whole robot: links, joints, limits, frames and coordinates.",
-        ),
-        "order": ("urdfkin.cli.order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
-        "view": (
-            "urdfkin.cli.view",
-            "Show a robot in a browser, with a slider for each joint and verified results.",
-        ),
-        "plot": ("urdfkin.cli.plot", "Plot a frame's motion along a trajectory."),
+        "robots": ("robots", "List the robots of the catalogue, which are loaded by name."),
+        "info": ("robots", "Show the whole robot: links, joints, limits, frames and coordinates."),
+        "order": ("order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
+        "view": ("view", "Show a robot in a browser, with a slider for each joint and verified results."),
+        "plot": ("plot", "Plot a frame's motion along a trajectory."),
     },
     _COMPUTE: {
         "analytical-jacobian": (
-            "urdfkin.cli.quantity",
+            "quantity",
             "Compute the analytical Jacobian: derivatives of a frame's position and angles.",
         ),
         "singular-values": (
-            "urdfkin.cli.quantity",
+            "quantity",
             "Compute a Jacobian's singular values and manipulability; explain a singularity.",
         ),
-        "imu": (
-            "urdfkin.cli.quantity",
-            "Compute the readings of an accelerometer and a gyroscope on a frame.",
-        ),
+        "imu": ("quantity", "Compute the readings of an accelerometer and a gyroscope on a frame."),
     },
     "Tables and code": {
-        "dh": ("urdfkin.cli.dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
+        "dh": ("dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
         "screws": (
-            "urdfkin.cli.paths",
+            "paths",
             "Compute the product of exponentials of a path: the pose at q = 0, and the joints' screws.",
         ),
-        "chain": ("urdfkin.cli.paths", "Show the joint axes on the path between two frames."),
-        "structure": (
-            "urdfkin.cli.paths",
-            "Classify the arm along a path: wrist, parallel axes, closed-form solvers.",
-        ),
-        "export": (
-            "urdfkin.cli.export",
-            "Export verified kinematics as code in C, Python, MATLAB and other languages.",
-        ),
+        "chain": ("paths", "Show the joint axes on the path between two frames."),
+        "structure": ("paths", "Classify the arm along a path: wrist, parallel axes, closed-form solvers."),
+        "export": ("export", "Export verified kinematics as code in C, Python, MATLAB and other languages."),
     },
     "Compare and calibrate": {
-        "same": (
-            "urdfkin.cli.models",
-            "Prove that two robot models move alike, or bound the distance of their frames.",
-        ),
+        "same": ("models", "Prove that two robot models move alike, or bound the distance of their frames."),
         "diff": (
-            "urdfkin.cli.models",
+            "models",
             "List the changes between two versions of a robot file and their effect on motion.",
         ),
-        "calibrate": (
-            "urdfkin.cli.calibrate",
-            "Fit a robot's parameters to measured poses and write them to the URDF.",
-        ),
+        "calibrate": ("calibrate", "Fit a robot's parameters to measured poses and write them to the URDF."),
     },
     "Validate against Pinocchio": {
         "validate": (
-            "urdfkin.cli.validate",
+            "validate",
             "Compare all frames and joints with Pinocchio at many random configurations.",
         ),
         "verify": (
-            "urdfkin.cli.verify",
+            "verify",
             "Compare the results of your function or program with urdfkin's and Pinocchio's.",
         ),
         "readers": (
-            "urdfkin.cli.readers",
+            "readers",
             "Compare how MuJoCo, yourdfpy and other installed libraries read a robot file.",
         ),
-        "vectors": (
-            "urdfkin.cli.vectors",
-            "Write test vectors for other programs: robots and results at 50 digits.",
-        ),
-        "report": ("urdfkin.cli.reports", "Show, convert, compare or merge the results of validations."),
+        "vectors": ("vectors", "Write test vectors for other programs: robots and results at 50 digits."),
+        "report": ("reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {
-        "check": ("urdfkin.cli.check", "Lint URDF files; every finding has a code, a line and a remedy."),
-        "explain": (
-            "urdfkin.cli.explain",
-            "Explain the code of a finding, an equation, or a common question.",
-        ),
+        "check": ("check", "Lint URDF files; every finding has a code, a line and a remedy."),
+        "explain": ("explain", "Explain the code of a finding, an equation, or a common question."),
     },
     "Shell": {
-        "completion": ("urdfkin.cli.completion", "Print a completion script for bash, zsh or fish."),
-        "warm": ("urdfkin.cli.warm", "Compile all kernels in advance, for container images and CI."),
+        "completion": ("completion", "Print a completion script for bash, zsh or fish."),
+        "warm": ("warm", "Compile all kernels in advance, for container images and CI."),
     },
 }
 #: This module makes a command for each quantity in `verify/quantities.py`.
-_QUANTITY = "urdfkin.cli.quantity"
+_QUANTITY = "quantity"
 
 
 def groups() -> dict[str, dict[str, tuple[str, str]]]:
@@ -196,7 +169,7 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if (found := commands().get(cmd_name)) is None:
             return None
-        module = importlib.import_module(found[0])
+        module = importlib.import_module(f"urdfkin.cli.{found[0]}")
         made = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
         if made is None:
             made = module.command_of(by_command()[cmd_name]) if found[0] == _QUANTITY else module.command
