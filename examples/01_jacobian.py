@@ -1,15 +1,16 @@
 """Compute the Jacobian at a pose given by joint names, and interpret one of its columns.
 
 You learn how to name joints, which units apply, how rows and columns are ordered, and how results are
-    checked.
+checked.
 """
 
 import numpy as np
 
 import urdfkin
 
-robot = urdfkin.load("panda")  # a name that `urdfkin robots` lists, a path, or URDF text
-# A named pose, then changes in radians, degrees or multiples of pi. A mapping by name also works.
+robot = urdfkin.load("panda")  # The argument is a name, a path, or URDF text.
+# The pose is a named pose with changes in radians, degrees or multiples of pi.
+# A mapping by name also works.
 pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"
 
 J = robot.jacobian(pose, "panda_hand_tcp")  # (6, nv), rows [linear; angular], eq. 7.85

@@ -8,9 +8,9 @@ import urdfkin
 robot = urdfkin.load("ur10")
 q = robot.sample(2000, seed=1)
 
-robot.jacobian(q, robot.tip_frame)  # the default: Pinocchio computes every result again
-robot.placement(q, robot.tip_frame, verify="sample")  # 100 of the 2,000
-robot.velocity(q, q, robot.tip_frame, verify=False)  # no check; the certificate reports it
+robot.jacobian(q, robot.tip_frame)  # By default, Pinocchio computes every result again.
+robot.placement(q, robot.tip_frame, verify="sample")  # Pinocchio computes 100 of the 2,000 again.
+robot.velocity(q, q, robot.tip_frame, verify=False)  # The certificate reports results without a check.
 
 certificate = robot.certificate()
 print(certificate)

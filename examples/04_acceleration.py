@@ -8,7 +8,7 @@ import numpy as np
 import urdfkin
 from urdfkin.compiled.breakdown import KINDS
 
-robot = urdfkin.load("polar")  # the textbook's robot: a revolute joint, then a prismatic joint
+robot = urdfkin.load("polar")  # The textbook's robot has a revolute and a prismatic joint.
 q = np.array([0.4, 0.5])  # rad, m
 v = np.array([1.0, 0.8])
 a = np.array([0.2, -0.3])

@@ -16,7 +16,7 @@ for reference in urdfkin.Reference:
 # LOCAL is the velocity in the tool's axes. The tool's rotation converts it to LOCAL_WORLD_ALIGNED.
 R_world_tool = robot.placement(q, "tool0")[:3, :3]
 local = robot.velocity(q, v, "tool0", "local")
-aligned = robot.velocity(q, v, "tool0")  # the default
+aligned = robot.velocity(q, v, "tool0")  # the default frame
 assert np.allclose(R_world_tool @ local[:3], aligned[:3])
 
 # WORLD is the velocity of the point of the moving body at the world's origin.

@@ -17,9 +17,9 @@ x, y, _ = arm.placement(q, "tool0", base=turntable)[:3, 3]
 print("on a turntable:", acceleration[:3].round(6), "m/s^2")
 assert np.allclose(acceleration[:3], [-x, -y, 0.0])  # w x (w x d), 7.130
 
-# The same arm with a floating base: its pose is part of q, and its velocity is part of v.
+# The pose of a floating base is part of q, and its velocity is part of v.
 free = urdfkin.load("ur5", root_joint="floating")
-q_free = np.concatenate([[0, 0, 0, 0, 0, 0, 1.0], q])  # x y z, quaternion x y z w, then the joints
+q_free = np.concatenate([[0, 0, 0, 0, 0, 0, 1.0], q])  # The order is x y z, quaternion x y z w, joints.
 v_free = np.concatenate([[0, 0, 0, 0, 0, 1.0], v])
 print("as a floating base:", free.velocity(q_free, v_free, "tool0").round(6))
 print(free.certificate())

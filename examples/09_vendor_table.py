@@ -11,7 +11,7 @@ from urdfkin.dh.compare import compare
 from urdfkin.dh.parse_table import reference_path
 
 robot = urdfkin.load("ur5")
-published = urdfkin.read_table(reference_path("ur5"))  # or a .toml, .json or .csv of your own
+published = urdfkin.read_table(reference_path("ur5"))  # A path of your own file works too.
 path = robot.chain("tool0", "base")
 
 found = compare(path, published)

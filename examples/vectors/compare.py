@@ -1,4 +1,4 @@
-"""Compare your results with test vectors. It needs Python only, no library.
+"""Compare your results with test vectors; no library is needed.
 
 from compare import wrong
 

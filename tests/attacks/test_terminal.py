@@ -291,9 +291,7 @@ def test_what_is_printed_goes_through_the_door() -> None:
             'click.echo(f"questions: ',
         ),
         "check.py": ("click.echo(as_json(", "click.echo(as_sarif("),
-        "reports.py": ("click.echo(VALIDATION.schema_text()", "click.echo(HISTORY.schema_text()"),
-        "models.py": ("click.echo(SAME.schema_text()",),
-        "vectors.py": ("click.echo(vectors.VECTORS.schema_text()",),
+        "options.py": ("click.echo(getattr(importlib.import_module(module), name).schema_text()",),
         "__init__.py": ('click.echo(f"urdfkin {own_version()}, Pinocchio {version()',),
         "exit.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),
     }  # fmt: skip

@@ -150,6 +150,7 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
     ("screws", "home", "message"),
     [
         ([[0, 0, 2, 0, 0, 0]], M, "screw 1: the axis w of a screw must have length 1: found 2"),
+        ([[0, 0, 0, 0, 0, 2]], M, "screw 1: the axis v of a screw must have length 1: found 2"),
         ([[0, 0, 1, 0, 0, 0.1]], M, "must be a pure rotation or a pure translation: found a pitch of 0.1"),
         ([[0, 0, 1]], M, r"screws must have the shape \(n, 6\)"),
         ([[0, 0, 1, 0, 0, 0]], np.ones((4, 4)), "M must be a rotation"),

@@ -23,117 +23,87 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: The commands under each heading of the help page: the module of each command, and a summary of one line. In
-#: a module with one command, the command's function is called `command`. In a module with several commands,
-#: the function of the command NAME is called `NAME_command`. `groups` adds the commands of
-#: `verify/quantities.py`, for example `jacobian`, at the top of the heading `_COMPUTE`.
+#: Each command has its module in `urdfkin.cli` and a summary, under a heading of the help page.
+#: The function of the only command in a module is called `command`; otherwise it is called `NAME_command`.
+#: `groups` adds the commands of `verify/quantities.py`, for example `jacobian`, to the heading `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
-        "robots": ("urdfkin.cli.robots", "List the robots of the catalogue, which are loaded by name."),
-        "info": (
-            "urdfkin.cli.robots",
-            "Show the whole robot: links, joints, limits, frames and coordinates.",
-        ),
-        "order": ("urdfkin.cli.order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
-        "view": (
-            "urdfkin.cli.view",
-            "Show a robot in a browser, with a slider for each joint and verified results.",
-        ),
-        "plot": ("urdfkin.cli.plot", "Plot a frame's motion along a trajectory."),
+        "robots": ("robots", "List the robots of the catalogue, which are loaded by name."),
+        "info": ("robots", "Show the whole robot: links, joints, limits, frames and coordinates."),
+        "order": ("order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
+        "view": ("view", "Show a robot in a browser, with a slider for each joint and verified results."),
+        "plot": ("plot", "Plot a frame's motion along a trajectory."),
     },
     _COMPUTE: {
         "analytical-jacobian": (
-            "urdfkin.cli.quantity",
+            "quantity",
             "Compute the analytical Jacobian: derivatives of a frame's position and angles.",
         ),
         "singular-values": (
-            "urdfkin.cli.quantity",
+            "quantity",
             "Compute a Jacobian's singular values and manipulability; explain a singularity.",
         ),
-        "imu": (
-            "urdfkin.cli.quantity",
-            "Compute the readings of an accelerometer and a gyroscope on a frame.",
-        ),
+        "imu": ("quantity", "Compute the readings of an accelerometer and a gyroscope on a frame."),
     },
     "Tables and code": {
-        "dh": ("urdfkin.cli.dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
+        "dh": ("dh", "Derive Denavit-Hartenberg tables, or compare one with a published table."),
         "screws": (
-            "urdfkin.cli.paths",
+            "paths",
             "Compute the product of exponentials of a path: the pose at q = 0, and the joints' screws.",
         ),
-        "chain": ("urdfkin.cli.paths", "Show the joint axes on the path between two frames."),
-        "structure": (
-            "urdfkin.cli.paths",
-            "Classify the arm along a path: wrist, parallel axes, closed-form solvers.",
-        ),
-        "export": (
-            "urdfkin.cli.export",
-            "Export verified kinematics as code in C, Python, MATLAB and other languages.",
-        ),
+        "chain": ("paths", "Show the joint axes on the path between two frames."),
+        "structure": ("paths", "Classify the arm along a path: wrist, parallel axes, closed-form solvers."),
+        "export": ("export", "Export verified kinematics as code in C, Python, MATLAB and other languages."),
     },
     "Compare and calibrate": {
-        "same": (
-            "urdfkin.cli.models",
-            "Prove that two robot models move alike, or bound the distance of their frames.",
-        ),
+        "same": ("models", "Prove that two robot models move alike, or bound the distance of their frames."),
         "diff": (
-            "urdfkin.cli.models",
+            "models",
             "List the changes between two versions of a robot file and their effect on motion.",
         ),
-        "calibrate": (
-            "urdfkin.cli.calibrate",
-            "Fit a robot's parameters to measured poses and write them to the URDF.",
-        ),
+        "calibrate": ("calibrate", "Fit a robot's parameters to measured poses and write them to the URDF."),
     },
     "Validate against Pinocchio": {
         "validate": (
-            "urdfkin.cli.validate",
+            "validate",
             "Compare all frames and joints with Pinocchio at many random configurations.",
         ),
         "verify": (
-            "urdfkin.cli.verify",
+            "verify",
             "Compare the results of your function or program with urdfkin's and Pinocchio's.",
         ),
         "readers": (
-            "urdfkin.cli.readers",
+            "readers",
             "Compare how MuJoCo, yourdfpy and other installed libraries read a robot file.",
         ),
-        "vectors": (
-            "urdfkin.cli.vectors",
-            "Write test vectors for other programs: robots and results at 50 digits.",
-        ),
-        "report": ("urdfkin.cli.reports", "Show, convert, compare or merge the results of validations."),
+        "vectors": ("vectors", "Write test vectors for other programs: robots and results at 50 digits."),
+        "report": ("reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {
-        "check": ("urdfkin.cli.check", "Lint URDF files; every finding has a code, a line and a remedy."),
-        "explain": (
-            "urdfkin.cli.explain",
-            "Explain the code of a finding, an equation, or a common question.",
-        ),
+        "check": ("check", "Lint URDF files; every finding has a code, a line and a remedy."),
+        "explain": ("explain", "Explain the code of a finding, an equation, or a common question."),
     },
     "Shell": {
-        "completion": ("urdfkin.cli.completion", "Print a completion script for bash, zsh or fish."),
-        "warm": ("urdfkin.cli.warm", "Compile all kernels in advance, for container images and CI."),
+        "completion": ("completion", "Print a completion script for bash, zsh or fish."),
+        "warm": ("warm", "Compile all kernels in advance, for container images and CI."),
     },
 }
-#: The module that makes a command for each quantity in `verify/quantities.py`, for example `jacobian`.
-_QUANTITY = "urdfkin.cli.quantity"
+#: This module makes a command for each quantity in `verify/quantities.py`.
+_QUANTITY = "quantity"
 
 
 def groups() -> dict[str, dict[str, tuple[str, str]]]:
-    """Return each command's module and summary, grouped by heading of the help page."""
     rows = {name: (_QUANTITY, f"Compute the {row.summary}.") for name, row in by_command().items()}
     return _GROUPS | {_COMPUTE: rows | _GROUPS[_COMPUTE]}
 
 
 def commands() -> dict[str, tuple[str, str]]:
-    """Return each command's module and summary."""
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
-#: For each word that users may type instead of a command: the right command. If the value contains options,
-#: as in "placement --relative-to FRAME", the error message suggests the value.
+#: Users may type these words instead of the command on the right.
+#: The error message suggests the whole value, for example "placement --relative-to FRAME".
 _SYNONYMS = {
     **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
     **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),
@@ -162,7 +132,7 @@ _SYNONYMS = {
     **dict.fromkeys(("equal", "equivalent"), "same"),
     **dict.fromkeys(("list", "catalogue", "catalog"), "robots"),
 }
-#: For each word about a subject that urdfkin does not support: the advice in the error message.
+#: For each word about an unsupported subject, the error message contains this advice.
 _ABSENT = {
     **dict.fromkeys(
         ("ik", "inverse", "inverse-kinematics", "solve"),
@@ -178,10 +148,7 @@ _ABSENT = {
 
 
 def _unknown(name: str) -> UrdfkinError:
-    """Return the error for an unknown command.
-
-    If the word is a common name of an existing command, the error suggests this command.
-    """
+    """Return the error for an unknown command; it suggests an existing command with this meaning."""
     word = name.lower().replace("_", "-")
     if word in commands():
         return UnknownNameError("command", name, [word])
@@ -197,14 +164,12 @@ class LazyGroup(click.Group):
     """A command group that imports a command only when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the command names in the order of the help page."""
         return list(commands())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import one command's module and return the command; None for an unknown name."""
         if (found := commands().get(cmd_name)) is None:
             return None
-        module = importlib.import_module(found[0])
+        module = importlib.import_module(f"urdfkin.cli.{found[0]}")
         made = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
         if made is None:
             made = module.command_of(by_command()[cmd_name]) if found[0] == _QUANTITY else module.command
@@ -221,18 +186,14 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
-        """Return the commands and options that begin with `incomplete`.
-
-        The modules of the commands are not imported.
-        """
-        from click.shell_completion import CompletionItem  # noqa: PLC0415  only for shell completion
+        """Return the commands and options that begin with `incomplete`, without importing a command."""
+        from click.shell_completion import CompletionItem  # noqa: PLC0415  only completion needs this
 
         found = [(name, summary) for name, (_, summary) in commands().items() if name.startswith(incomplete)]
         names = [CompletionItem(name, help=summary) for name, summary in found]
         return names + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands with their summaries, grouped by heading."""
         width = max(map(len, commands()))
         for heading, entries in groups().items():
             with formatter.section(heading):
@@ -246,7 +207,7 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version  # noqa: PLC0415
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
-    pinocchio()  # raises an error with the remedy if Pinocchio is not installed
+    pinocchio()  # This call raises an error if Pinocchio is not installed.
     ctx.exit()
 
 
@@ -266,18 +227,13 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the `urdfkin` command.
-
-    Exit 0: verified. 1: a disagreement. 2: bad input or usage. 3: computed, but not checked by Pinocchio.
-    70: a defect of urdfkin. 128 + n: stopped by signal n.
-    """
     streams.prepare()
     guard()
-    # For small matrices, one thread of OpenBLAS is fastest. OpenBLAS reads the number of threads when NumPy
-    # imports it.
+    # For small matrices, one thread of OpenBLAS is fastest.
+    # OpenBLAS reads the number of threads when NumPy imports it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if os.environ.get("_URDFKIN_COMPLETE"):  # print no error during shell completion
+    if os.environ.get("_URDFKIN_COMPLETE"):  # Shell completion prints no error.
         sys.stderr = io.StringIO()
-    # Hide this warning: the last line of the output already states that the result was not verified, and why.
+    # The last line of the output already states that the result was not verified, and why.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

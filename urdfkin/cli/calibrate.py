@@ -124,7 +124,7 @@ def command(
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
     from urdfkin.report.calibration import as_data, document, moved_table  # noqa: PLC0415
-    from urdfkin.report.diff import lines_of  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.diff import lines_of  # noqa: PLC0415  --help stays fast
 
     check_writable(output)
     given = [name for name in ("poses", "ur") if context.params[name] is not None]
@@ -193,7 +193,6 @@ def _reject_unused(context: click.Context, given: list[str]) -> None:
 
 
 def _run(context: click.Context, robot: Robot) -> Calibration:
-    """Run the calibration that the command's options request."""
     from urdfkin.calibration.calibrate import fitted_model, read_poses  # noqa: PLC0415
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
     from urdfkin.dh.table import DHTable  # noqa: PLC0415
@@ -221,7 +220,7 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
     if conversion is not None and q is not None:
         q = conversion.from_(q)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the table is loaded again here; do not repeat its warnings
+        warnings.simplefilter("ignore")  # The table was loaded before, with the same warnings.
         return fitted_model(
             source,
             q,
@@ -247,13 +246,8 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 
 def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
-    """Apply a factory calibration. Print how far the tool's poses with the two values of --order differ."""
-    from urdfkin.calibration.universal_robots import (  # noqa: PLC0415
-        ORDERS,
-        distance,
-        read_calibration,
-        universal_robots,
-    )
+    """Apply a factory calibration; print the difference that the two values of --order make."""
+    from urdfkin.calibration.universal_robots import ORDERS, distance, read_calibration, universal_robots  # noqa: PLC0415
     from urdfkin.comparison.result import angle, length  # noqa: PLC0415
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))

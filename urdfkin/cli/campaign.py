@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Seconds between two progress lines in a log, and between two progress lines of JSON.
+#: Seconds between two progress lines
 _LINES, _JSON = 10.0, 0.5
 
 
@@ -63,10 +63,10 @@ def progress(*, as_json: bool) -> Iterator[Progress]:
 
 
 def line(state: CampaignProgress, pace: Pace) -> str:
-    """Return the progress as one line of text."""
+    earlier = f" ({state.chunks_kept:,} from an earlier run)" if state.chunks_kept else ""
     return (
         f"{state.robots_done:,} of {state.robots:,} robots, {state.chunks_done:,} of"
-        f" {state.chunks:,} chunks{_earlier(state)}; {_speed(state, pace)}"
+        f" {state.chunks:,} chunks{earlier}; {_speed(state, pace)}"
         f"{_failures(state)}; {state.label}"
     )
 
@@ -83,10 +83,6 @@ def duration(seconds: float) -> str:
             rest = whole % size // smaller
             return f"{whole // size} {unit}" + (f" {rest} {name}" if rest else "")
     return f"{whole} s"
-
-
-def _earlier(state: CampaignProgress) -> str:
-    return f" ({state.chunks_kept:,} from an earlier run)" if state.chunks_kept else ""
 
 
 def _speed(state: CampaignProgress, pace: Pace) -> str:
@@ -141,27 +137,23 @@ def _bar(pace: Pace) -> Iterator[Progress]:
         def tell(state: CampaignProgress) -> None:
             pace_ = _speed(state, pace)
             words = f"{state.robots_done}/{state.robots} robots, {pace_}{_failures(state)},"
-            bar.update(
-                task,
-                completed=state.chunks_done,
-                total=state.chunks,
-                description=printable(state.label),
-                words=words,
-            )
+            done, label = state.chunks_done, printable(state.label)
+            bar.update(task, completed=done, total=state.chunks, description=label, words=words)
 
         yield tell
 
 
-EXAMPLE = "urdfkin report status nightly"
-#: `status` lists at most `_NAMED` failed robots. It estimates the time for a chunk of samples from the times
-#: of up to `_READ` finished chunks.
+#: `status` lists at most `_NAMED` failed robots.
+#: It estimates the time for a chunk of samples from up to `_READ` finished chunks.
 _NAMED, _READ = 20, 200
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
 @click.command(
-    "status", short_help="Show the progress of a validation with --store.", epilog=f"Example: {EXAMPLE}"
+    "status",
+    short_help="Show the progress of a validation with --store.",
+    epilog="Example: urdfkin report status nightly",
 )
 @click.argument("folder", metavar="DIR", type=_FOLDER)
 @click.pass_context
@@ -169,8 +161,7 @@ def status(context: click.Context, folder: Path) -> None:
     """Show the finished and failed robots, and an estimate of the remaining time.
 
     The command reads only few of the files in DIR, so it is fast and does not disturb a running validation.
-    `urdfkin report DIR`
-    reads and checks all files. Exit 0: complete. 3: something is missing or failed.
+    `urdfkin report DIR` reads and checks all files. Exit 0: complete. 3: something is missing or failed.
     """
     from urdfkin.validation.store import Store  # noqa: PLC0415
 
@@ -205,11 +196,10 @@ def status(context: click.Context, folder: Path) -> None:
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    """Print the progress of the accuracy study, if requested."""
     if not store.has_judge:
         return
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
-    from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.words import counted  # noqa: PLC0415  --help stays fast
     from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
 
     if (results := AccuracyResult.of(store)) is not None:
@@ -217,7 +207,6 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
 
 
 def _why(store: Store, robot: int) -> str:
-    """Return the reason why the validation of a robot failed."""
     from urdfkin.validation.answer import Failure  # noqa: PLC0415
 
     for index in range(len(store.manifest.cut)):
@@ -252,7 +241,7 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     Results of the accuracy study are copied too. Each file is read and checked; damaged files are reported
     and skipped. DIR is made if it does not exist.
     """
-    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  --help stays fast
     from urdfkin.validation.store import Store, opened  # noqa: PLC0415
 
     others = [Store.reading(store, _warn) for store in stores]

@@ -26,7 +26,8 @@ from urdfkin.cli.options import (
     source_options,
     together,
 )
-from urdfkin.cli.streams import command_lines, harmless, say, say_file, say_styled
+from urdfkin.cli.output import hand_out
+from urdfkin.cli.streams import command_lines, harmless, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
 from urdfkin.system.git import Version, version_before
@@ -60,7 +61,6 @@ class Outcome:
     """The results of all files.
 
     Attributes:
-        files: The checked files, by name.
         findings: Findings to print.
         silenced: Pairs of a finding that a comment in the file suppresses, and the reason in this comment.
         excerpts: For each finding, the line of the file, and a second line with a caret under the fault.
@@ -85,7 +85,6 @@ class Outcome:
     unsafe: int = 0
 
     def add(self, file: str, found: Examined) -> None:
-        """Add the result of checking one file."""
         excerpts = Excerpts(found.data)
         self.files.append(file)
         self.findings += found.findings
@@ -94,7 +93,6 @@ class Outcome:
 
 
 def print_outcome(outcome: Outcome, style: str, *, statistics: bool) -> None:
-    """Print all findings in one format."""
     findings, version = outcome.findings, installed_version("urdfkin") or "0+unknown"
     if style == "json":
         click.echo(as_json(findings, outcome.files, version, outcome.silenced))
@@ -151,7 +149,6 @@ def _print_statistics(outcome: Outcome) -> None:
 
 
 def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
-    """Print one line for each code that was fixed in a file."""
     for code in sorted({finding.code for finding in fixed}):
         these = [finding for finding in fixed if finding.code == code]
         turns = max(finding.fix.turns for finding in these if finding.fix)
@@ -162,13 +159,8 @@ def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
         say(f"{file}: fixed {code} {RULES[code].slug}, {where}{moved}", err=True)
 
 
-def difference(file: str, before: bytes, after: bytes) -> str:
-    """Return the changes that the fixes have made, as a patch."""
-    return patch(file, before, after, harmless)
-
-
 _SETTINGS = "urdfkin.settings"
-#: The settings in pyproject.toml that set the default of an option of the same name.
+#: These settings in pyproject.toml are the defaults of the options with the same names.
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
@@ -235,7 +227,7 @@ settings_options = together(
         help="File with a table [tool.urdfkin] of settings.  [default: nearest pyproject.toml]",
     ),
 )  # fmt: skip
-#: The help texts of the options --max-bytes, --max-depth and so on, by field of `Limits`.
+#: Help texts of --max-bytes, --max-depth, ...
 _MOST = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",
@@ -268,9 +260,7 @@ limit_options = together(
 @click.option("--output", "-o", type=_FILE, help="Write the findings, or the patch of --diff, to this file.")
 @click.option("--fix", is_flag=True, help="Apply the automatic fixes to the files.")
 @click.option(
-    "--unsafe-fixes",
-    is_flag=True,
-    help="Also apply fixes that rotate a joint by more than a rounding error.",
+    "--unsafe-fixes", is_flag=True, help="Also apply fixes that rotate a joint by more than a rounding error."
 )
 @click.option("--diff", is_flag=True, help="Print the changes of --fix as a patch, without applying them.")
 @click.option("--statistics", is_flag=True, help="Print the number of findings of each code.")
@@ -323,7 +313,7 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     if options["diff"]:
         found, among = run.outcome.to_fix, len(run.outcome.files)
         many = "s" * (found != 1), "s" * (among != 1)
-        _put_patch("".join(run.outcome.patches), options["output"])
+        hand_out("".join(run.outcome.patches), options["output"])
         more = f" ({run.outcome.unsafe} more with --unsafe-fixes)" if run.outcome.unsafe else ""
         say(f"{found} finding{many[0]} to fix in {among} file{many[1]}{more}", err=True)
     elif options["write_baseline"] is None:
@@ -331,13 +321,6 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     for failure in run.outcome.unreadable:
         say(f"urdfkin: error: {failure}", err=True)
     sys.exit(run.exit_code())
-
-
-def _put_patch(text: str, path: Path | None) -> None:
-    if path is None:
-        say_file(text)
-    else:
-        write_file(path, text.encode())
 
 
 def _put_outcome(outcome: Outcome, style: str, path: Path | None, *, statistics: bool) -> None:
@@ -397,12 +380,10 @@ class Run:
         choice: Selects the findings to report.
         strict: Whether warnings become errors.
         fold: Whether to merge findings with the same code into one line of output.
-        fix: Whether to apply fixes.
         diff: Whether to collect the changes that the fixes would make, as patches.
         unsafe: Whether the user gave --unsafe-fixes.
         version: The version that --changed-since names, or None.
         accepting: Whether the user gave --write-baseline, so that all findings are accepted.
-        outcome: The results so far.
     """
 
     look: partial[Examined]
@@ -430,10 +411,7 @@ class Run:
             if file not in self._taken:
                 self._taken.add(file)
                 try:
-                    if file not in (
-                        word,
-                        f"./{word}",
-                    ):  # found in a folder, not named by the user
+                    if file not in (word, f"./{word}"):  # The file was found in a folder.
                         demand_regular(Path(file))
                     self._check(file)
                 except UrdfkinError as error:
@@ -457,9 +435,7 @@ class Run:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_other(self, file: str) -> None:
-        """Check a USD or MJCF file.
-
-        If `load` rejects the robot, add the findings of its error.
+        """Check a USD or MJCF file; if `load` rejects the robot, add the findings of its error.
 
         With --changed-since, an unchanged file is skipped, and all findings of a changed file are reported.
         """
@@ -468,7 +444,7 @@ class Run:
         ):
             self.outcome.unchanged += 1
             return
-        from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
+        from urdfkin.robot.loading import load  # noqa: PLC0415  --help stays fast
 
         how = how_to_load()
         with warnings.catch_warnings():
@@ -511,7 +487,7 @@ class Run:
             say(f"{file}: {code} is not fixed: {objection}", err=True)
         if self.diff:
             self.outcome.to_fix += len(mended.fixed)
-            self.outcome.patches.append(difference(file, text.data, mended.text.data))
+            self.outcome.patches.append(patch(file, text.data, mended.text.data, harmless))
             chosen = choose()
             self.outcome.unsafe += sum(
                 chosen(f) and bool(f.fix and not f.fix.is_safe) and not self.unsafe
@@ -528,7 +504,7 @@ class Run:
         return lambda finding: chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
 
     def _with_severity(self, finding: Finding) -> Finding:
-        # Do not apply --strict for --write-baseline: a baseline file stores each finding's original severity.
+        # A baseline file stores each finding's original severity.
         raised = self.strict and not self.accepting and finding.severity is Severity.WARNING
         return replace(finding, severity=Severity.ERROR) if raised else finding
 
@@ -539,20 +515,19 @@ class Run:
         return 2 if self.outcome.unreadable else int(bad)
 
 
-#: Suffixes of MJCF files and of the files that they include.
+#: Suffixes of MJCF files and includes
 _MJCF = (".xml", ".mjcf")
 
 
 def _is_other(file: str) -> bool:
-    """Return whether a file is USD or MJCF."""
     if is_usd(file):
         return True
     if Path(file).suffix.lower() not in _MJCF:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            return False  # without the next import, which loads NumPy
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  slow, and not needed for a URDF
+            return False  # The next import loads NumPy.
+    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  this import is slow, and a URDF does not need it
 
     return is_mjcf(file)
 

@@ -22,23 +22,21 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Matches a name that completion may offer: a name without quotes, blanks, and characters that a shell
-#: expands. Names with a colon do not match, because bash separates words at colons.
+#: Completion offers a name without quotes, blanks, and characters that a shell expands.
+#: A name with a colon does not match, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
-#: Largest file that is read for its names, in bytes.
+#: A larger file (bytes) is not read for its names.
 _MOST = 10_000_000
-#: The tags of the XML elements whose `name` is a frame. In a URDF, these elements are children of the root
-#: element. In an MJCF file, they are at any depth.
+#: The `name` of these XML elements is a frame.
+#: They are children of the root element in a URDF, and at any depth in an MJCF file.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
 def complete_robot(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Return files and the names of the catalogue."""
     return [CompletionItem(incomplete, type="file"), *_offered(catalogue(), incomplete)]
 
 
 def complete_file(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Return files."""
     return [CompletionItem(incomplete, type="file")]
 
 
@@ -50,23 +48,20 @@ def complete_frame(context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_table(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Return files and the shipped tables."""
-    from urdfkin.system.resources import robots_dir  # noqa: PLC0415  only for completion
+    from urdfkin.system.resources import robots_dir  # noqa: PLC0415  only completion needs this module
 
     shipped = sorted(path.stem for path in (robots_dir() / "dh").glob("*.toml"))
     return [CompletionItem(incomplete, type="file"), *_offered(shipped, incomplete)]
 
 
 def complete_code(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Return the codes of findings and their short names."""
-    from urdfkin.urdf.lint.pages import RULES  # noqa: PLC0415  only for completion
+    from urdfkin.urdf.lint.pages import RULES  # noqa: PLC0415  only completion needs this module
 
     return _offered((name for rule in RULES.values() for name in (rule.id, rule.slug)), incomplete)
 
 
 def complete_topic(context: click.Context, parameter: click.Parameter, incomplete: str) -> Items:
-    """Return the topics of `explain`: codes and equations."""
-    from urdfkin.kinematics.registry import equations  # noqa: PLC0415  only for completion
+    from urdfkin.kinematics.registry import equations  # noqa: PLC0415  only completion needs this module
 
     return [*complete_code(context, parameter, incomplete), *_offered(equations(), incomplete)]
 
@@ -100,7 +95,7 @@ def _frames(word: str) -> Iterator[str]:
 
 
 SHELLS = ("bash", "zsh", "fish")
-#: The completion script of the shell sets this environment variable; click then prints completions.
+#: If the completion script sets this environment variable, click prints completions.
 VARIABLE = "_URDFKIN_COMPLETE"
 
 

@@ -20,7 +20,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import Answer, answering, compiling
 
-#: Formats of a table, copied from `urdfkin.dh.export.FORMATS`, so that --help need not import that module.
+#: The formats are copied from `urdfkin.dh.export.FORMATS`, whose import would slow --help down.
 FORMATS = (
     *("terminal", "markdown", "html", "latex", "csv", "json", "toml"),
     *("numpy", "sympy", "casadi", "matlab", "matlab-symbolic", "matlab-rst", "roboticstoolbox", "ets"),
@@ -33,8 +33,6 @@ ENDINGS = {
     ".m": ("matlab", "matlab-symbolic", "matlab-rst"), ".c": ("c",), ".h": ("c",), ".urdf": ("urdf",),
     ".svg": ("svg",),
 }  # fmt: skip
-
-EXAMPLE = "urdfkin dh ur5 --base base --tip tool0 --snap 1e-6 --degrees --millimetres"
 
 
 def _choice(name: str, choices: tuple[str, ...], text: str) -> Any:
@@ -156,18 +154,16 @@ form_options = together(
 )
 
 
-#: --like replaces these options: they have no effect in a command line with --like.
+#: The option --like replaces these options.
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
 #: If ROBOT is a table, the command writes the table unchanged, unless the user gives one of these options.
-#: With one of these options, the command makes a robot from the table and derives a new table from this
-#: robot.
+#: With one of them, the command makes a robot from the table and derives a new table from this robot.
 _DERIVED = ("base", "tip", "all_", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 
 
 def _reject_unused(context: click.Context, is_table: bool, options: dict[str, Any]) -> None:
-    """Reject options that have no effect together with other options."""
     compares, tree, form = options["compare"] is not None, options["tree"], options["format_"]
     written = ("terminal", "markdown", "html", "latex")
     for idle, where, because in (
@@ -177,18 +173,14 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
         (("tip", "like"), options["all_"], "with --all"),
         (_SIGNS, options["like"] is not None, "with --like"),
         (("columns",), tree or compares, "unless the output is one table"),
-        (
-            _UNITS,
-            form not in written,
-            f"in the format {form!r}, which is exact, in metres and radians",
-        ),
+        (_UNITS, form not in written, f"in the format {form!r}, which is exact, in metres and radians"),
         (("mimic", "root_joint", "xacro_arg"), is_table, "for a robot from a table"),
     ):
         if where:
             reject_unused_options(context, idle, because)
 
 
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin dh ur5 --base base --tip tool0 --snap 1e-6 --degrees --millimetres")
 @robot_argument
 @part_options
 @choice_options

@@ -38,25 +38,22 @@ from urdfkin.system.files import at_home
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
-#: Formats that can contain several tables.
+#: Formats for several tables
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: In these formats, the check's result is printed below the table. With other formats, the result of the
-#: check goes to stderr.
+#: In these formats, the check's result is printed below the table; otherwise it goes to stderr.
 _PRINTED = ("terminal", "markdown")
-#: Formats for people. All other formats are for data and code.
+#: Formats for people
 _TEXTS = (*_PRINTED, "html", "latex")
-#: For each format that rounds numbers: the number of digits in the base and tool transforms. None: --digits.
+#: Digits of base and tool in formats that round numbers are --digits, or the given number.
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """The command's options.
+    """The command's options; `choices` are other arguments of `Robot.dh`.
 
-    Attributes:
-        written: File of the table, if ROBOT is a table that the command writes unchanged. None: the command
-            derives a table from the robot.
-        choices: Other arguments of `Robot.dh`.
+    `written` is the file of the table, if ROBOT is a table that the command writes unchanged. If `written` is
+    None, the command derives a table from the robot.
     """
 
     robot: Robot
@@ -80,7 +77,6 @@ class Work:
 
     @property
     def units(self) -> Units:
-        """Number format of the options."""
         return Units(
             Angles.DEGREES if self.degrees else Angles.RADIANS,
             Lengths.MILLIMETRES if self.millimetres else Lengths.METRES,
@@ -90,7 +86,6 @@ class Work:
 
 
 def run(work: Work) -> Answer:
-    """Return the result of `urdfkin dh`."""
     chosen = [
         name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
     ]
@@ -109,17 +104,19 @@ def run(work: Work) -> Answer:
 
 
 def _tables(work: Work) -> Answer:
-    tips = _tips(work)
+    tree = work.robot.tree
+    tips = [tree.links[leaf] for leaf in tree.leaves()] if work.all_ else [work.tip]
     if len(tips) > 1 and work.format_ not in _FORMATS_OF_SEVERAL:
         raise InputError(
             f"--all does not support the format {work.format_!r}",
             remedy=f"use --format {', '.join(_FORMATS_OF_SEVERAL)}",
         )
-    made = [_table(work, tip) for tip in tips]
-    if work.format_ == "json" and work.all_:
-        text = json.dumps([_document(table, check) for table, check in made], indent=2) + "\n"
-    elif work.format_ == "json":
-        text = json.dumps(_document(*made[0]), indent=2) + "\n"
+    verifier = work.robot.verifier
+    tables = [_make_table(work, tip, work.snap) for tip in tips]
+    made = [(table, verifier.table(table) if verifier.policy else None) for table in tables]
+    if work.format_ == "json":
+        documents = [_document(table, check) for table, check in made]
+        text = json.dumps(documents if work.all_ else documents[0], indent=2) + "\n"
     else:
         text = "\n".join(_format_table(work, table, check) for table, check in made)
     if work.format_ not in (*_PRINTED, "json"):
@@ -129,21 +126,11 @@ def _tables(work: Work) -> Answer:
     return _answer(work, text, 0 if all(check is not None and check.within for _, check in made) else 3)
 
 
-def _tips(work: Work) -> list[str | None]:
-    tree = work.robot.tree
-    return [tree.links[leaf] for leaf in tree.leaves()] if work.all_ else [work.tip]
-
-
-def _table(work: Work, tip: str | None) -> tuple[DHTable, TableCheck | None]:
-    robot, table = work.robot, _make_table(work, tip, work.snap)
-    return table, robot.verifier.table(table) if robot.verifier.policy else None
-
-
 def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
     robot, base = work.robot, work.base
     if work.written is not None:
         table = read_table_or_screws(at_home(work.written))
-        # `Robot.dh` derives a table from screws in the same way as from a URDF
+        # `Robot.dh` derives a table from screws in the same way as from a URDF.
         if isinstance(table, DHTable):
             return to_convention(table, work.convention or table.convention)
     like = None
@@ -155,22 +142,15 @@ def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
         )
     if base is None and work.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
-    return robot.dh(
-        tip,
-        base,
-        work.convention or (like.convention if like else "standard"),
-        snap=snap,
-        like=like,
-        verify=False,
-        **work.choices,
-    )
+    convention = work.convention or (like.convention if like else "standard")
+    return robot.dh(tip, base, convention, snap=snap, like=like, verify=False, **work.choices)
 
 
 def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:
     if work.format_ == "urdf":
         return to_urdf(table)
     if work.format_ == "svg":
-        from urdfkin.view.dh_drawing import drawing  # noqa: PLC0415  needs an extra
+        from urdfkin.view.dh_drawing import drawing  # noqa: PLC0415  this module needs an extra
 
         return drawing(table)
     text = export(table, work.format_, work.units, verify=bool(work.robot.verifier.policy))
@@ -261,7 +241,6 @@ def _compare(work: Work, name: str) -> Answer:
 
 
 def _frame_of_robot(work: Work, name: object) -> str | None:
-    """Return `name` if it is the name of a frame of the robot; otherwise None."""
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
 

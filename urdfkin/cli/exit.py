@@ -20,26 +20,18 @@ from urdfkin.cli import streams
 from urdfkin.cli.streams import say
 from urdfkin.errors import UrdfkinError
 
-#: Signals that end a command. A scheduler, `kill` or a shutdown sends SIGTERM.
-#: A terminal that closes sends SIGHUP.
+#: A scheduler, `kill` or a shutdown sends SIGTERM, and a closing terminal sends SIGHUP.
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(slots=True)
 class Stop:
-    """Stores which signal stopped the command.
-
-    Attributes:
-        signal: The number of the signal; None if no signal stopped the command.
-    """
+    """The number of the signal that stopped the command, or None."""
 
     signal: int | None = None
 
     def exit_code(self, otherwise: int) -> int:
-        """Return 128 + the number of the signal, as shells do.
-
-        If `otherwise` is 1 (a disagreement), return 1.
-        """
+        """Return 128 + the number of the signal, as shells do; 1 (a disagreement) has priority."""
         return otherwise if self.signal is None or otherwise == 1 else 128 + self.signal
 
 
@@ -68,9 +60,9 @@ def stoppable() -> Iterator[Stop]:
                 signal.signal(each, signal.SIG_DFL)
 
 
-#: Exit code after an unexpected error: EX_SOFTWARE of sysexits.h.
+#: Exit code EX_SOFTWARE of sysexits.h
 CRASH = 70
-#: Exit code after an interrupt: 128 + the number of SIGINT, as in shells.
+#: Exit code 128 + SIGINT
 _INTERRUPTED = 130
 
 
@@ -78,7 +70,7 @@ def run(command: click.Command, name: str) -> int:
     """Run a command and return its exit code.
 
     0: done, and verified where possible. 1: a disagreement. 2: bad input or usage. 3: computed, but not
-    checked by Pinocchio. 70: a defect of urdfkin. 130: interrupted.
+    checked by Pinocchio. 70: a defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
     """
     try:
         # In standalone mode, click would exit with 1 after an interrupt.
@@ -99,13 +91,11 @@ def run(command: click.Command, name: str) -> int:
 
 
 def refuse(error: UrdfkinError) -> int:
-    """Print an error of urdfkin and return its exit code."""
     click.echo(f"urdfkin: error: {error}", err=True)
     return 1 if error.is_disagreement else 2
 
 
 def _refuse_usage(error: click.ClickException) -> int:
-    """Print a usage error of click in our format and return its exit code."""
     context = getattr(error, "ctx", None)
     page = f"; see: {context.command_path} --help" if context is not None else ""
     say(f"urdfkin: error: {error.format_message().rstrip('.')}{page}", err=True)
@@ -113,9 +103,8 @@ def _refuse_usage(error: click.ClickException) -> int:
 
 
 def crash(error: Exception) -> int:
-    """Print an unexpected error with its traceback and return its exit code."""
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
-        # urdfkin was installed with --no-deps, for example by pre-commit.
+        # For example, pre-commit installs urdfkin with --no-deps.
         remedy = "install urdfkin with its dependencies: pip install PATH_OF_THE_CLONE"
         click.echo(f"urdfkin: error: {error.name} is not installed; {remedy}", err=True)
         return 2

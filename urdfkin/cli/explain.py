@@ -1,7 +1,4 @@
-"""`urdfkin explain`: print the page of a finding's code, an equation, or a common question.
-
-The answers to questions are the sections of docs/questions.md.
-"""
+"""`urdfkin explain`: print the page of a finding's code, an equation, or a question of docs/questions.md."""
 
 from __future__ import annotations
 
@@ -23,28 +20,19 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return a mapping from the anchor of each question's heading to its section.
-
-    Links in a section are replaced by their texts.
-    """
+    """Return each section by the anchor of its heading; links are replaced by their texts."""
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
 def answer_to(topic: str) -> str | None:
-    """Return the section of the questions page for a topic, or None.
-
-    The topic is the anchor of a heading, or some words that only one anchor contains.
-    """
+    """Return the section with an anchor, or the only section whose anchor contains all words; else None."""
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)
 
 
 def as_text(answer: str) -> str:
-    """Format a section for a terminal.
-
-    Paragraphs are wrapped and code is indented. The code's set-up comes last.
-    """
+    """Format a section for a terminal; the code's set-up comes last."""
     pieces = _BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []

@@ -1,7 +1,4 @@
-"""`urdfkin export`: write a frame's kinematics as code.
-
-The same file contains test vectors and their bounds.
-"""
+"""`urdfkin export`: write a frame's kinematics as code, with test vectors and their bounds."""
 
 from __future__ import annotations
 
@@ -18,15 +15,13 @@ from urdfkin.cli.options import (
     robot_options,
     verify_option,
 )
-from urdfkin.cli.output import check_line, exit_code, write_file
-from urdfkin.cli.streams import say, say_file
+from urdfkin.cli.output import check_line, exit_code, hand_out
+from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
 
-EXAMPLE = "urdfkin export panda --frame panda_hand --to c -o panda_hand.c"
 
-
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin export panda --frame panda_hand --to c -o panda_hand.c")
 @click.argument("robot", metavar="[ROBOT]", required=False, shell_complete=complete_robot)
 @robot_options
 @frame_option
@@ -92,7 +87,7 @@ def command(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
         context.exit(_check(file))
-    from urdfkin.export import code_in, write  # noqa: PLC0415  keeps --help fast
+    from urdfkin.export import code_in, write  # noqa: PLC0415  --help stays fast
     from urdfkin.export.forms import code_of_robot  # noqa: PLC0415
 
     assert robot is not None
@@ -100,11 +95,7 @@ def command(
     wanted = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
     frame = frame or loaded.tip_frame
     code = code_in(code_of_robot(loaded, frame, wanted, reference, form, name=name, verify=verify), to)
-    text = write(code, to)
-    if output is None or output == Path("-"):
-        say_file(text)
-    else:
-        write_file(output, text.encode())
+    hand_out(write(code, to), None if output == Path("-") else output)
     proof = code.proof
     say(check_line(proof.certificate), err=True)
     if proof.constants and proof.certificate.verified:

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from urdfkin.cli.completion import complete_robot
-from urdfkin.cli.options import NumberFrom, Whole, load_several, reject_unused_options, source_options
+from urdfkin.cli.options import (
+    NumberFrom,
+    Whole,
+    load_several,
+    reject_unused_options,
+    schema_option,
+    source_options,
+)
 from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, compiling, write_file
 from urdfkin.cli.streams import say
 from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import csv_value, json_text
 
 if TYPE_CHECKING:
+    from urdfkin.comparison.result import Question
     from urdfkin.robot import Robot
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
-#: Options of `urdfkin same` that need exactly two robots.
+#: These options of `urdfkin same` need exactly two robots.
 _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
 
 
@@ -66,7 +75,7 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--html", type=_PATH, help="Write an HTML page with a picture of both robots at the worst configuration."
 )
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of a certificate and exit.")
+@schema_option("urdfkin.comparison.certificate:SAME", "a certificate")
 @source_options
 @answering(*TEXTS, "json")
 def same_command(
@@ -79,7 +88,6 @@ def same_command(
     boxes: int | None,
     all_: bool,
     recheck: Path | None,
-    schema: bool,
     **paths: Path | None,
 ) -> Answer:
     """Prove whether A and B are the same robot in every configuration; with C, compare each pair.
@@ -95,35 +103,28 @@ def same_command(
 
     Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
     --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are
-    compared as written. Exit 0:
-    all frames stay within the given distance. 1: a frame does not.
+    compared as written. Exit 0: all frames stay within the given distance. 1: a frame does not.
     """
-    if schema:
-        from urdfkin.comparison.certificate import SAME  # noqa: PLC0415  keeps --help fast
+    from urdfkin.comparison.bounds import MOST  # noqa: PLC0415  --help stays fast
+    from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
+    from urdfkin.comparison.result import Question  # noqa: PLC0415
+    from urdfkin.comparison.verdict import parse_map, same  # noqa: PLC0415
+    from urdfkin.model.conventions import as_toml  # noqa: PLC0415
+    from urdfkin.report.same import as_html, command_of, document, markdown_of  # noqa: PLC0415
 
-        click.echo(SAME.schema_text(), nl=False)
-        click.get_current_context().exit()
     if a is None or b is None:
         raise click.UsageError("name two robots to compare: urdfkin same A B")
     check_writable(*paths.values())
     if more:
         reject_unused_options(click.get_current_context(), _OF_TWO, "with more than two robots")
-        return _all_pairs((a, b, *more), within, strict=strict, boxes=boxes)
+        return _all_pairs((a, b, *more), Question(within, strict), MOST if boxes is None else boxes)
     first, second = load_several(a, b)
     robots = first, second
     with compiling():
         if recheck is not None:
             return _recheck(robots, recheck)
-        from urdfkin.comparison.bounds import MOST  # noqa: PLC0415
-        from urdfkin.comparison.result import Question  # noqa: PLC0415
-        from urdfkin.comparison.verdict import parse_map, same  # noqa: PLC0415
-
         how_many = MOST if boxes is None else boxes
         found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
-    from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
-    from urdfkin.model.conventions import as_toml  # noqa: PLC0415
-    from urdfkin.report.same import as_html, command_of, document, markdown_of  # noqa: PLC0415
-
     question = Question(within, strict)
     words = [word for pair in pairs for word in ("--map", pair)]
     words += ["--boxes", str(boxes)] if boxes is not None else []
@@ -141,22 +142,15 @@ def same_command(
     return Answer(lambda: document(found, question, all_=all_), data, code=code)
 
 
-def _all_pairs(sources: tuple[str, ...], within: float | None, *, strict: bool, boxes: int | None) -> Answer:
-    """Compare each pair of several robots, such as the URDF, the MJCF and the USD of one robot."""
-    from itertools import combinations  # noqa: PLC0415  keeps --help fast
+def _all_pairs(sources: tuple[str, ...], question: Question, boxes: int) -> Answer:
+    from urdfkin.comparison.certificate import certificate  # noqa: PLC0415  --help stays fast
+    from urdfkin.comparison.verdict import same  # noqa: PLC0415
+    from urdfkin.report.same import command_of, pairs_document, pairs_markdown  # noqa: PLC0415
 
     robots = load_several(*sources)
     with compiling():
-        from urdfkin.comparison.bounds import MOST  # noqa: PLC0415
-        from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
-        from urdfkin.comparison.result import Question  # noqa: PLC0415
-        from urdfkin.comparison.verdict import same  # noqa: PLC0415
-        from urdfkin.report.same import command_of, pairs_document, pairs_markdown  # noqa: PLC0415
-
-        how_many = MOST if boxes is None else boxes
-        question = Question(within, strict)
         twos = list(combinations(robots, 2))
-        found = [same(*two, boxes=how_many, within=within) for two in twos]
+        found = [same(*two, boxes=boxes, within=question.within) for two in twos]
     data = {
         "json": lambda: {
             "holds": all(one.holds(question) for one in found),
@@ -171,7 +165,7 @@ def _all_pairs(sources: tuple[str, ...], within: float | None, *, strict: bool, 
 
 
 def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
-    from urdfkin.comparison.certificate import SAME, recheck, words_of  # noqa: PLC0415  keeps --help fast
+    from urdfkin.comparison.certificate import SAME, recheck, words_of  # noqa: PLC0415  --help stays fast
 
     certificate = SAME.read(path)
     errors = recheck(certificate, *robots)
@@ -190,9 +184,7 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 @click.argument("b", metavar="NEW", shell_complete=complete_robot)
 @click.argument("more", metavar="[C]...", nargs=-1, shell_complete=complete_robot)
 @click.option(
-    "--effects/--no-effects",
-    default=True,
-    help="Compute how far each change can move the frames (default).",
+    "--effects/--no-effects", default=True, help="Compute how far each change can move the frames (default)."
 )
 @click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
 @source_options
@@ -207,9 +199,7 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """
-    from itertools import combinations  # noqa: PLC0415  keeps --help fast
-
-    from urdfkin.comparison.diff import diff  # noqa: PLC0415
+    from urdfkin.comparison.diff import diff  # noqa: PLC0415  --help stays fast
     from urdfkin.report.diff import (  # noqa: PLC0415
         HEADS,
         as_data,
@@ -231,22 +221,15 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 
     if markdown is not None:
         write_file(markdown, as_markdown().encode())
+    heads = ("A", "B", *HEADS) if more else HEADS
+    rows = [(*one.sources, *row) if more else row for one in found for row in rows_of(one)]
+    data = {
+        "json": lambda: {"pairs": [as_data(one) for one in found]} if more else as_data(found[0]),
+        "csv": lambda: [heads, *(map(csv_value, row) for row in rows)],
+        "markdown": as_markdown,
+    }
     code = int(any(found))
     if more:
-        rows = [(*one.sources, *row) for one in found for row in rows_of(one)]
-        several: dict[str, Any] = {
-            "json": lambda: {"pairs": [as_data(one) for one in found]},
-            "csv": lambda: [("A", "B", *HEADS), *(map(csv_value, row) for row in rows)],
-            "markdown": as_markdown,
-        }
-        return Answer(lambda: pairs_document(found), several, code=code)
-    return Answer(
-        lambda: document(found[0]),
-        {
-            "json": lambda: as_data(found[0]),
-            "csv": lambda: [HEADS, *(map(csv_value, row) for row in rows_of(found[0]))],
-            "markdown": as_markdown,
-        },
-        code=code,
-        fitted=lambda _: TextDocument("", lines_of(found[0])),
-    )
+        return Answer(lambda: pairs_document(found), data, code=code)
+    lines = TextDocument("", lines_of(found[0]))
+    return Answer(lambda: document(found[0]), data, code=code, fitted=lambda _: lines)

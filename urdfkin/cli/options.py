@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import importlib
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -34,28 +35,25 @@ if TYPE_CHECKING:
 
 
 class Whole(click.IntRange):
-    """The type of an option whose value is a whole number in a range."""
+    """The type of a whole number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the text as an int."""
         if isinstance(value, str) and parse_int(value) is None:
             self.fail(f"{value!r} is not a whole number.", param, ctx)
         return super().convert(value, param, ctx)
 
 
 class Number(click.types.FloatParamType):
-    """The type of an option whose value is a finite number."""
+    """The type of a finite number."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the text as a float."""
         return super().convert(_finite(self, value, param, ctx), param, ctx)
 
 
 class NumberFrom(click.FloatRange):
-    """The type of an option whose value is a finite number in a range."""
+    """The type of a finite number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the text as a float."""
         return super().convert(_finite(self, value, param, ctx), param, ctx)
 
 
@@ -71,15 +69,9 @@ def format_from_suffix(
 ) -> str:
     """Return the output format of the running command.
 
-    Args:
-        context: The click context of the command; the command has the option --format.
-        output: The file, or None for standard output.
-        endings: The formats that a file with each suffix can have, for example `{".py": ("numpy", "sympy")}`.
-            The first format is the default.
-        plain: The format to write if the file's name has no suffix.
-
-    Raises:
-        InputError: --format contradicts the suffix, or the suffix has no format.
+    `endings` are the formats of each suffix, for example `{".py": ("numpy", "sympy")}`; the first format is
+    the default. `plain` is the format if the file's name has no suffix. InputError is raised if --format
+    contradicts the suffix, or if the suffix has no format.
     """
     format_: str = context.params["format_"]
     if output is None:
@@ -111,16 +103,9 @@ def typed(context: click.Context, name: str) -> bool:
 
 
 def reject_unused_options(context: click.Context, idle: Collection[str], because: str) -> None:
-    """Reject options that were given on the command line but have no effect.
+    """Raise InputError if one of the parameters `idle`, which have no effect, was given on the command line.
 
-    Args:
-        context: Context of the command.
-        idle: The options that have no effect, as names of parameters.
-        because: Why these options have no effect, for example "with --opw". The error message is then
-            "--format does nothing with --opw".
-
-    Raises:
-        InputError: The user gave one of these options.
+    With the reason "with --opw", the error message is "--format does nothing with --opw".
     """
     for parameter in context.command.params:
         if parameter.name in idle and typed(context, parameter.name):
@@ -130,15 +115,12 @@ def reject_unused_options(context: click.Context, idle: Collection[str], because
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
-#: Names of the reference frames.
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
-#: Number of samples that `random` draws; `random:N` draws N.
+#: `random` draws this number of samples; `random:N` draws N samples.
 _RANDOM_SAMPLES = 1
 
 
 def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
-    """Combine several decorators of click into one, for example those of several options."""
-
     def decorate(function: _F) -> _F:
         for decorator in reversed(decorators):
             function = decorator(function)
@@ -150,45 +132,29 @@ def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
 _HOW = "urdfkin.how_to_load"
 
 
-def _remember(context: click.Context, parameter: click.Parameter, value: object) -> None:
-    """Store the value of an option that `how_to_load` returns later."""
-    context.meta.setdefault(_HOW, {})[parameter.name] = value
+def _storing(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
+    """Return a callback that stores an option for `how_to_load`, by default only if the option was given."""
+
+    def store(context: click.Context, _: click.Parameter, value: Any) -> None:
+        if always or value not in (None, ()):
+            context.meta.setdefault(_HOW, {})[name] = value if read is None else read(value)
+
+    return store
 
 
-def _remember_xacro_args(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
-    arguments = {}
-    for word in words:
-        name, colon, value = word.partition(":=")
-        if not colon or not name:
-            raise click.BadParameter(f"{word!r} is not NAME:=VALUE")
-        arguments[name] = value
-    context.meta.setdefault(_HOW, {})["xacro_args"] = arguments
+def _pairs(mark: str, form: str, *, demand_value: bool) -> Callable[[Sequence[str]], dict[str, str]]:
+    """Return a function that splits words such as SET=NAME, and rejects words of another form."""
 
+    def read(words: Sequence[str]) -> dict[str, str]:
+        pairs = {}
+        for word in words:
+            name, found, value = word.partition(mark)
+            if not found or not name or (demand_value and not value):
+                raise click.BadParameter(f"{word!r} is not {form}")
+            pairs[name] = value
+        return pairs
 
-def _remember_lock(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
-    if words:
-        context.meta.setdefault(_HOW, {})["lock"] = ", ".join(words)
-
-
-def _remember_joints(context: click.Context, _: click.Parameter, words: str | None) -> None:
-    if words is not None:
-        context.meta.setdefault(_HOW, {})["joints"] = [name.strip() for name in words.split(",")]
-
-
-def _remember_variants(context: click.Context, _: click.Parameter, words: Sequence[str]) -> None:
-    chosen = {}
-    for word in words:
-        name, equals, value = word.partition("=")
-        if not equals or not name or not value:
-            raise click.BadParameter(f"{word!r} is not SET=NAME")
-        chosen[name] = value
-    if chosen:
-        context.meta.setdefault(_HOW, {})["variant"] = chosen
-
-
-def _remember_articulation(context: click.Context, _: click.Parameter, word: str | None) -> None:
-    if word is not None:
-        context.meta.setdefault(_HOW, {})["articulation"] = word
+    return read
 
 
 def how_to_load() -> dict[str, Any]:
@@ -201,7 +167,7 @@ xacro_option = click.option(
     multiple=True,
     metavar="NAME:=VALUE",
     expose_value=False,
-    callback=_remember_xacro_args,
+    callback=_storing("xacro_args", _pairs(":=", "NAME:=VALUE", demand_value=False), always=True),
     help="Argument of a .xacro file; repeatable. xacro runs in a restricted process.",
 )
 
@@ -212,32 +178,29 @@ usd_options = together(
         multiple=True,
         metavar="SET=NAME",
         expose_value=False,
-        callback=_remember_variants,
+        callback=_storing("variant", _pairs("=", "SET=NAME", demand_value=True)),
         help="Select a variant of a USD stage; repeatable.",
     ),
     click.option(
         "--articulation",
         metavar="PATH",
         expose_value=False,
-        callback=_remember_articulation,
+        callback=_storing("articulation"),
         help="Path of the articulation to load, if a USD stage has several.",
     ),
 )
-#: The options --xacro-arg, --variant and --articulation, which concern the robot's file.
+#: These options concern the robot's file.
 source_options = together(xacro_option, usd_options)
 
 
 def mimic_option(help_: str) -> Callable[[_F], _F]:
-    """Make the option that turns mimic rules on or off; `how_to_load` returns its value."""
-    return click.option(
-        "--mimic/--no-mimic", default=None, expose_value=False, callback=_remember, help=help_
-    )
+    store = _storing("mimic", always=True)
+    return click.option("--mimic/--no-mimic", default=None, expose_value=False, callback=store, help=help_)
 
 
 def root_joint_option(help_: str) -> Callable[[_F], _F]:
-    """Make the option for the joint between the world and the root link; `how_to_load` returns its value."""
-    joints = click.Choice(["floating", "planar"])
-    return click.option("--root-joint", type=joints, expose_value=False, callback=_remember, help=help_)
+    joints, store = click.Choice(["floating", "planar"]), _storing("root_joint", always=True)
+    return click.option("--root-joint", type=joints, expose_value=False, callback=store, help=help_)
 
 
 lock_options = together(
@@ -246,7 +209,7 @@ lock_options = together(
         multiple=True,
         metavar="NAME=VALUE",
         expose_value=False,
-        callback=_remember_lock,
+        callback=_storing("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
         " With --joints, the value of the first --lock may be a pose, such as ready.",
     ),
@@ -254,7 +217,7 @@ lock_options = together(
         "--joints",
         metavar="NAMES",
         expose_value=False,
-        callback=_remember_joints,
+        callback=_storing("joints", lambda words: [name.strip() for name in words.split(",")]),
         help="Joints that remain, separated by commas. All others are fixed at 0, or at the value of --lock.",
     ),
 )
@@ -270,7 +233,6 @@ robot_argument = together(
 
 
 def frame_name(option: str, help_: str) -> Callable[[_F], _F]:
-    """Make an option that takes a frame's name, with shell completion of the name."""
     return click.option(option, metavar="NAME", help=help_, shell_complete=complete_frame)
 
 
@@ -281,14 +243,10 @@ path_options = together(
 )
 
 
-class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # generic from click 8.2 on
-    """The type of an option whose value is a reference frame.
-
-    The error for an unknown name refers to the explanation of the reference frames.
-    """
+class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # the class is generic from click 8.2 on
+    """The name of a reference frame; the error for an unknown name refers to the explanation."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the name in its standard spelling."""
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
@@ -320,10 +278,7 @@ _VALUES = (
 )
 q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
 v_option = click.option(
-    "--v",
-    metavar="VALUES",
-    default="neutral",
-    help="Joint velocities, written like --q; `neutral` is zero.",
+    "--v", metavar="VALUES", default="neutral", help="Joint velocities, written like --q; `neutral` is zero."
 )
 a_option = click.option(
     "--a",
@@ -338,7 +293,7 @@ convention_option = click.option(
     help="Convention of --q, --v, --a, --trajectory and of the result: the name of a tool (`urdfkin order`"
     " lists them), or a TOML file.",
 )
-#: The option --convention of a command that converts the joint values that it reads, but not its result.
+#: This --convention is for commands that convert only the joint values that they read.
 convention_of_input_option = click.option(
     "--convention",
     metavar="NAME|FILE",
@@ -348,27 +303,35 @@ convention_of_input_option = click.option(
 
 
 def trajectory_option(help_: str) -> Callable[[_F], _F]:
-    """Make the option for a file of samples."""
     files = (
         "CSV with the columns t, NAME, v:NAME and a:NAME for each joint, with units as in 'elbow [deg]';"
         " or .npz with the arrays t, q, v and a"
     )
     return click.option(
-        "--trajectory",
-        type=click.Path(path_type=Path),
-        metavar="FILE",
-        help=f"{help_} File: {files}.",
+        "--trajectory", type=click.Path(path_type=Path), metavar="FILE", help=f"{help_} File: {files}."
     )
 
 
+def schema_option(layout: str, what: str) -> Callable[[_F], _F]:
+    """Make the option --schema, which prints the JSON Schema of a layout such as "urdfkin.module:SAME"."""
+
+    def show(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+        if wanted and not context.resilient_parsing:
+            module, name = layout.split(":")
+            click.echo(getattr(importlib.import_module(module), name).schema_text(), nl=False)
+            context.exit()
+
+    help_ = f"Print the JSON Schema of {what} and exit."
+    return click.option("--schema", is_flag=True, expose_value=False, callback=show, help=help_)
+
+
 def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
-    """Return the conversion that --convention requests."""
     return None if name is None else robot.convention(name)
 
 
 def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
     """Read a trajectory with joint velocities and accelerations, and write remarks about it to stderr."""
-    from urdfkin.robot.trajectory import read_trajectory  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.trajectory import read_trajectory  # noqa: PLC0415  --help stays fast
 
     motion = read_trajectory(robot, path, convention=convention)
     tell_notes(motion)
@@ -400,8 +363,6 @@ class Inputs:
     """A robot, a frame and the values to compute with.
 
     Attributes:
-        robot: The robot.
-        frame: Name of the frame.
         q: (n, n_q) configurations, rad or m.
         v: (n, n_v) joint velocities.
         a: (n, n_v) joint accelerations.
@@ -427,12 +388,10 @@ class Inputs:
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """The names of the entries of q."""
         return (self.conversion or self.robot).coordinate_names
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """The names of the entries of v and a."""
         return (self.conversion or self.robot).rate_names
 
     def converted(self) -> Inputs:
@@ -448,11 +407,8 @@ class Inputs:
 
 
 def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
-    """Load a robot with the options of the command line; `how` overrides them.
-
-    Write each warning to stderr.
-    """
-    from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
+    """Load a robot with the options of the command line; `how` overrides them. Warnings go to stderr."""
+    from urdfkin.robot.loading import load  # noqa: PLC0415  --help stays fast
     from urdfkin.urdf.findings import UrdfWarning  # noqa: PLC0415
 
     with warnings.catch_warnings(record=True) as caught:
@@ -467,10 +423,9 @@ def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocc
 def load_several(*sources: str) -> tuple[Robot, ...]:
     """Load a command's robots; `--xacro-arg` applies to .xacro files, `--variant` to USD files.
 
-    Raises:
-        UsageError: Two of the robots are `-`, that is, standard input.
+    UsageError is raised if two of the robots are `-`, that is, standard input.
     """
-    from urdfkin.urdf.sources import is_usd, is_xacro  # noqa: PLC0415  keeps --help fast
+    from urdfkin.urdf.sources import is_usd, is_xacro  # noqa: PLC0415  --help stays fast
 
     if sources.count("-") > 1:
         raise click.UsageError("only one of the robots can come from standard input")
@@ -509,7 +464,7 @@ def read_inputs(
             differ. Or --seed has no effect.
         SourceError: a file that cannot be read.
     """
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     if not any(text.startswith("random") for text in (q, v, a)):
         reject_unused_options(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
@@ -563,16 +518,13 @@ def _count(where: str, text: str) -> int:
 def read_batch(
     path: Path, option: str, layouts: Sequence[Sequence[str]], units: Mapping[str, str] | None = None
 ) -> tuple[FloatArray, Sequence[str]]:
-    """Read a CSV file with one sample a line.
+    """Read a CSV file with one sample a line, as an array with one row for each sample.
 
     If the first line names the columns, they may be in any order. The name of a column in `units` may contain
-    a unit, for example "elbow [deg]".
-
-    Returns:
-        The numbers, with one row for each sample. Second, the list of column names from `layouts` whose
-        length is the number of columns in the file.
+    a unit, for example "elbow [deg]". The second result is the list of column names from `layouts` whose
+    length is the number of columns in the file.
     """
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     from urdfkin.robot.trajectory import read_columns, width_of  # noqa: PLC0415
 
@@ -640,7 +592,7 @@ def with_base(
             length 1. Or the numbers of samples differ.
         SourceError: a file that cannot be read.
     """
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     from urdfkin.model.base_motion import BaseMotion  # noqa: PLC0415
 

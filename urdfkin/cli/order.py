@@ -16,13 +16,12 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Conversion
     from urdfkin.robot import Robot
 
-EXAMPLE = "urdfkin order a1 --from isaaclab --to mujoco"
 _NO_ORDER = (
     "The joint order of idyntree follows no known rule; pass it as robot.convention('idyntree', joints=[...])"
 )
 
 
-@click.command("order", epilog=f"Example: {EXAMPLE}")
+@click.command("order", epilog="Example: urdfkin order a1 --from isaaclab --to mujoco")
 @robot_argument
 @click.option("--from", "start", metavar="NAME|FILE", help="Convention to convert from. Default: urdfkin.")
 @click.option("--to", "end", metavar="NAME|FILE", help="Convention to convert to. Default: urdfkin.")
@@ -42,7 +41,7 @@ def command(robot: str, start: str | None, end: str | None) -> Answer:
 
 
 def _table(robot: Robot) -> Answer:
-    from urdfkin.model.conventions import BUILT_IN, find_convention  # noqa: PLC0415  keeps --help fast
+    from urdfkin.model.conventions import BUILT_IN, find_convention  # noqa: PLC0415  --help stays fast
 
     found = {name: robot.convention(name) for name in BUILT_IN if find_convention(name).order != "given"}
     cells = {name: _cells(robot, conversion) for name, conversion in found.items()}

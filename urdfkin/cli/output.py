@@ -6,7 +6,6 @@ A file is written completely or not at all.
 from __future__ import annotations
 
 import io
-import math
 import os
 import sys
 import tempfile
@@ -34,15 +33,15 @@ if TYPE_CHECKING:
 
     from urdfkin.verify.certificate import Certificate
 
-#: Formats of a printed table.
+#: Formats of a printed table
 TEXTS = ("table", "markdown", "html", "latex")
-#: The suffix of a file in each format.
+#: Suffix of each format
 _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
     "latex": ".tex",
 }  # fmt: skip
-#: Largest width of a table in characters. All cells of a column are padded to the same width: without a
-#: limit, one cell with a very long name could fill the memory.
+#: A table has at most this number of characters in a line.
+#: All cells of a column have the same width, so one very long name could fill the memory.
 _WIDEST = 10_000
 
 output_option = click.option(
@@ -76,7 +75,6 @@ class Answer:
     fitted: Callable[[Console], TextDocument] | None = None
 
     def show(self, out: Console) -> None:
-        """Print the result on a terminal."""
         from urdfkin.report.listing import print_document  # noqa: PLC0415  machine formats need no tables
 
         print_document(out, self.document() if self.fitted is None else self.fitted(out))
@@ -111,7 +109,7 @@ class Answer:
 
 
 def _npy(array: Any) -> bytes:
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     stream = io.BytesIO()
     np.save(stream, array)
@@ -126,13 +124,9 @@ _WRITERS: dict[str, Callable[[Any], bytes | str]] = {
 def answering(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
     """Return a decorator for a function that returns an `Answer`.
 
-    The decorated function has the options --format and --output. The decorated function writes the answer and
-    ends the command with the answer's exit code.
-
-    Args:
-        names: The output formats of the command. Default: the formats in `TEXTS`, JSON and CSV.
-        suffixes: The formats that a file with each suffix can have. Default: `_SUFFIXES`, with one format for
-            each suffix.
+    The decorated function has the options --format and --output. It writes the answer, and ends the command
+    with the answer's exit code. `names` are the output formats of the command; by default the formats in
+    `TEXTS`, JSON and CSV. `suffixes` are the formats of each suffix; by default those of `_SUFFIXES`.
     """
     forms = names or (*TEXTS, "json", "csv")
     endings = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
@@ -157,22 +151,14 @@ def format_option(
 ) -> Callable[[Any], Any]:
     """Make the option --format; the first format is the default."""
     return click.option(
-        "--format",
-        "format_",
-        type=click.Choice(names),
-        default=names[0],
-        show_default=True,
-        help=help_,
+        "--format", "format_", type=click.Choice(names), default=names[0], show_default=True, help=help_
     )
 
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Print a line when a kernel is compiled, and then the time of the compilation.
-
-    A kernel is compiled only once on a machine.
-    """
-    from urdfkin.compiled.kept import listen_to_compile_events  # noqa: PLC0415  keeps --help fast
+    """Print a line when a kernel is compiled, and then the time; each kernel is compiled only once."""
+    from urdfkin.compiled.kept import listen_to_compile_events  # noqa: PLC0415  --help stays fast
 
     hints = [", once; 'urdfkin warm' compiles all kernels"]
 
@@ -192,14 +178,13 @@ def console(*, err: bool = False) -> Console:
 
     If the output goes to a pipe, the variable COLUMNS sets the width. Without COLUMNS, no line is wrapped.
     """
-    from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  keeps --help fast
+    from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  --help stays fast
 
     stream = sys.stderr if err else sys.stdout
     return Terminal(stream, width=None if stream.isatty() else _columns())
 
 
 def _columns() -> int:
-    """Return the value of the variable COLUMNS, or `_WIDEST` if COLUMNS is empty or 0."""
     wanted = parse_int(os.environ.get("COLUMNS", "")) or 0
     return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
 
@@ -218,14 +203,13 @@ def hand_out(data: bytes | str, output: Path | None) -> None:
 def check_writable(*paths: Path | None) -> None:
     """Raise SourceError if a file cannot be written; call this before the computation begins.
 
-    Raises:
-        SourceError: The permission is missing, or the folder does not exist.
+    The permission may be missing, or the folder may not exist.
     """
     for path in paths:
         if path is None:
             continue
         try:
-            if path.exists() and not path.is_file():  # a device or a pipe needs no temporary file
+            if path.exists() and not path.is_file():  # A device needs no temporary file.
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
                 pass
@@ -235,7 +219,7 @@ def check_writable(*paths: Path | None) -> None:
 
 
 def check_line(certificate: Certificate) -> str:
-    """Return a line with the number of checked results and the worst disagreement, or with "NOT VERIFIED"."""
+    """Return a line with the checked results and the worst disagreement, or with "NOT VERIFIED"."""
     by = certificate.oracle
     if certificate.not_verified:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
@@ -248,26 +232,15 @@ def check_line(certificate: Certificate) -> str:
 
 
 def exit_code(certificate: Certificate) -> int:
-    """Return the exit code: 0 if the results were checked, 3 if they could not be checked."""
     return 0 if certificate.verified else 3
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
     """Return the last line and the exit code of `urdfkin chain`, `screws`, `structure` or `dh`.
 
-    Args:
-        check: What Pinocchio has checked, for example a `TableCheck`; None if nothing was checked.
+    `check` is the result of Pinocchio's check, for example a `TableCheck`; None if nothing was checked.
     """
-    from urdfkin.verify.pinocchio import version  # noqa: PLC0415  keeps --help fast
+    from urdfkin.verify.pinocchio import version  # noqa: PLC0415  --help stays fast
 
     by = f"Pinocchio {version()}"
     return (f"NOT VERIFIED by {by}", 3) if check is None else (f"{by}: {check}", 0)
-
-
-def finite(value: Any) -> Any:
-    """Replace infinity and NaN by None, because JSON has neither."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -25,7 +25,7 @@ from urdfkin.cli.options import (
     together,
     verify_option,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, check_of_path, finite
+from urdfkin.cli.output import TEXTS, Answer, answering, check_of_path
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
@@ -71,7 +71,7 @@ def chain_command(
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.verify.chain_checks import check_chain  # noqa: PLC0415  keeps --help fast
+    from urdfkin.verify.chain_checks import check_chain  # noqa: PLC0415  --help stays fast
 
     loaded = load_robot(robot, verify=verify)
     path = loaded.chain(tip, base)
@@ -133,10 +133,6 @@ def _kind_of_joint(joint: Any) -> str:
 
 
 def _vector(numbers: FloatArray) -> str:
-    """Return the numbers as text with six digits.
-
-    A number of magnitude 1e-15 or less is shown as 0.
-    """
     return " ".join(six_digits(x) for x in numbers.tolist())
 
 
@@ -165,7 +161,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.dh.export.toolboxes import screws_document, write_screws  # noqa: PLC0415  keeps --help fast
+    from urdfkin.dh.export.toolboxes import screws_document, write_screws  # noqa: PLC0415  --help stays fast
     from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
 
     loaded = load_robot(robot, verify=verify)
@@ -199,7 +195,8 @@ def structure_command(
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.dh.structure import opw_of, structure  # noqa: PLC0415  keeps --help fast
+    from urdfkin.dh.structure import opw_of, structure  # noqa: PLC0415  --help stays fast
+    from urdfkin.system.documents import plain  # noqa: PLC0415
     from urdfkin.verify.chain_checks import check_opw, check_screws  # noqa: PLC0415
 
     if opw is not None:
@@ -209,7 +206,7 @@ def structure_command(
         screws = loaded.screws(tip, base, verify=False)
         check = check_screws(loaded.verifier, screws) if verify else None
         found = structure(screws)
-        data = {"json": lambda: finite(found.as_mapping())}
+        data = {"json": lambda: plain(found)}
         return Answer(lambda: _document(found), data, *check_of_path(check))
     path = loaded.chain(tip, base)
     parameters = opw_of(path, opw / 1e3)

@@ -28,17 +28,15 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.robot.trajectory import Trajectory
 
-#: These names are copied from `urdfkin.view.plot`, because importing that module would slow --help down.
+#: The names are copied from `urdfkin.view.plot`, whose import would slow --help down.
 PANELS = (
     *("q", "v", "a", "position", "orientation", "velocity", "angular-velocity", "acceleration"),
     *("angular-acceleration", "parts", "singular-values", "angular-singular-values", "manipulability"),
     *("angular-manipulability", "disagreement"),
 )
 
-EXAMPLE = "urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.svg"
 
-
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin plot ur5 --to 1,-1,1.2,0.3,0.5,0 --duration 2 --output ur5.svg")
 @robot_argument
 @frame_option
 @reference_option
@@ -115,7 +113,7 @@ def command(
     if (trajectory is None) == (end is None):
         raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
     from urdfkin.robot.frame_motion import frame_motion  # noqa: PLC0415
-    from urdfkin.view.figure import save  # noqa: PLC0415  keeps --help fast
+    from urdfkin.view.figure import save  # noqa: PLC0415  --help stays fast
     from urdfkin.view.plot import foot, sheet  # noqa: PLC0415
 
     check_writable(output)
@@ -132,13 +130,7 @@ def command(
 
 
 def _line(
-    robot: Robot,
-    start: str,
-    end: str,
-    duration: float,
-    samples: int,
-    seed: int,
-    convention: str | None,
+    robot: Robot, start: str, end: str, duration: float, samples: int, seed: int, convention: str | None
 ) -> Trajectory:
     from urdfkin.cli.options import read_inputs  # noqa: PLC0415
     from urdfkin.robot.trajectory import line  # noqa: PLC0415

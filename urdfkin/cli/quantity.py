@@ -1,7 +1,6 @@
 """Commands that compute a quantity of a frame, such as `urdfkin jacobian`, `placement` and `imu`.
 
-`verify/quantities.py` lists the quantities, and each quantity has a command. All these commands have the same
-options, input formats and output formats.
+Each quantity of `verify/quantities.py` has a command, and all have the same options and formats.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ from urdfkin.cli.options import (
     verify_option,
     with_base,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, check_line, compiling, exit_code, finite
+from urdfkin.cli.output import TEXTS, Answer, answering, check_line, compiling, exit_code
 from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
@@ -68,7 +67,7 @@ _BASE = ("base_placement", "base_velocity", "base_acceleration")
 _trajectory = trajectory_option(
     "Read q, v and a from a file instead of --q, --v and --a. CSV output has a row for each time."
 )
-#: Largest number of samples that the terminal output shows as tables.
+#: The terminal shows tables of at most this number of samples.
 _SHOWN = 5
 
 
@@ -84,17 +83,11 @@ def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Cal
     )
 
 
-def _load() -> Robot:
-    """Load the robot of the running command."""
-    options = click.get_current_context().params
-    return load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
-
-
 def _read() -> Inputs:
-    """Load the robot of the running command. Read q, v and a, or --trajectory. Read the --base options."""
+    """Load the robot of the command; read q, v and a or --trajectory, and the --base options."""
     options = click.get_current_context().params
     values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
-    robot = _load()
+    robot = load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
     conversion = conversion_of(robot, options["convention"])
     if options["trajectory"] is not None:
         inputs = _along(robot, options["frame"], options["trajectory"], "".join(values), conversion)
@@ -107,7 +100,7 @@ def _along(
     robot: Robot, frame: str | None, path: Path, letters: str, conversion: Conversion | None
 ) -> Inputs:
     """Read the samples of a trajectory; compute v and a by differences only if the command needs them."""
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     from urdfkin.robot.trajectory import read_samples, with_rates  # noqa: PLC0415
 
@@ -136,10 +129,7 @@ def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], 
     if x.conversion is not None:
         check += f", before the conversion to {x.conversion.convention.name}"
     return Answer(
-        lambda: TextDocument(f"{x.robot.name}: {title}", list(parts())),
-        data,
-        check,
-        exit_code(certificate),
+        lambda: TextDocument(f"{x.robot.name}: {title}", list(parts())), data, check, exit_code(certificate)
     )
 
 
@@ -165,7 +155,6 @@ _breakdown = click.option(
 
 
 def command_of(quantity: Quantity) -> click.Command:
-    """Make the command that computes a quantity."""
     has_breakdown = ACCELERATION_BREAKDOWN.command == f"{quantity.command} --breakdown"
 
     own = [reference_option] if quantity.referred else []
@@ -243,8 +232,8 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
     if quantity.columns and not x.along:
         rates = [csv_cell(name) for name in x.rate_names]
-        # The CSV of a Hessian has one line for each entry of the Jacobian. Each line lists the derivatives of
-        # this entry with respect to each joint.
+        # The CSV of a Hessian has one line for each entry of the Jacobian.
+        # Each line lists the derivatives of this entry with respect to each joint.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -261,7 +250,7 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: Heading of the first CSV column: "t" if the samples have times, otherwise "sample".
+#: The first CSV column is "t" if the samples have times, otherwise "sample".
 _TIME = ("sample", "t")
 
 
@@ -271,14 +260,13 @@ def _times(x: Inputs) -> Iterable[object]:
 
 
 def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
-    """Return the table of one sample."""
     if quantity.columns:
         return _columns(quantity, x.rate_names, value)
     if not quantity.units:
         relative_to = x.said.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    if len(value) != 3 * len(quantity.units):  # a quaternion
+    if len(value) != 3 * len(quantity.units):  # a position and a quaternion
         return Table(quantity.labels, [value.tolist()], left=0)
     names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
     rows = zip(names, value.reshape(-1, 3).tolist(), strict=True)
@@ -290,7 +278,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
     For a Hessian, the table has one row for each pair of entries of v whose derivatives are not all zero.
     """
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     if quantity.axes == len(("row", "rate")):
         return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
@@ -308,7 +296,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 
     Pinocchio checks the sum of the contributions, which is the acceleration.
     """
-    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  keeps --help fast
+    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  --help stays fast
 
     def parts() -> Iterator[str | Table]:
         yield "m/s^2, rad/s^2; terms (7.125): transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z"
@@ -319,7 +307,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
                 continue
             noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
             rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
-            # Print four digits, so that a row fits on the terminal.
+            # With four digits, a row fits on the terminal.
             cells = [
                 (*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows
             ]
@@ -354,26 +342,19 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 # -- commands with options of their own --------------------------------------------------------------
 
 _POSITION = ("x", "y", "z")
-#: The choices of `placement --as`, except the matrix.
+#: Choices of `placement --as` except matrix
 _FORMS = {
-    "rpy": replace(
+    name: replace(
         PLACEMENT,
-        shape=(6,),
-        labels=(*_POSITION, "roll", "pitch", "yaw"),
-        units={"x, y, z": "m", "roll, pitch, yaw": "rad"},
-    ),
-    "quaternion": replace(
-        PLACEMENT,
-        shape=(7,),
-        labels=(*_POSITION, "qx", "qy", "qz", "qw"),
-        units={"x, y, z": "m", "qx, qy, qz, qw": "1"},
-    ),
-    "wxyz": replace(
-        PLACEMENT,
-        shape=(7,),
-        labels=(*_POSITION, "qw", "qx", "qy", "qz"),
-        units={"x, y, z": "m", "qw, qx, qy, qz": "1"},
-    ),
+        shape=(3 + len(names),),
+        labels=(*_POSITION, *names),
+        units={"x, y, z": "m", ", ".join(names): unit},
+    )
+    for name, names, unit in (
+        ("rpy", ("roll", "pitch", "yaw"), "rad"),
+        ("quaternion", ("qx", "qy", "qz", "qw"), "1"),
+        ("wxyz", ("qw", "qx", "qy", "qz"), "1"),
+    )
 }
 
 
@@ -421,7 +402,7 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
     If Pinocchio has checked the poses, Pinocchio also checks these positions and orientations.
     """
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
 
@@ -447,7 +428,7 @@ def _again(x: Inputs, k: int, written: str) -> str:
     return f"{line} --as {written}"
 
 
-#: Copied from `urdfkin.kinematics.rotation.SEQUENCES`, because importing that module would slow --help down.
+#: This is a copy of `urdfkin.kinematics.rotation.SEQUENCES`, whose import would slow --help down.
 _TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
@@ -480,7 +461,7 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     rates of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity. `urdfkin
     jacobian` prints angular velocities instead.
     """
-    from urdfkin.kinematics.rotation import NEAREST  # noqa: PLC0415  keeps --help fast
+    from urdfkin.kinematics.rotation import NEAREST  # noqa: PLC0415  --help stays fast
 
     x, nearest = _read(), NEAREST if nearest is None else nearest
     with compiling():
@@ -526,7 +507,7 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
     explain gravity-in-an-acceleration`.
     """
-    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415  --help stays fast
 
     x = _read()
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
@@ -568,6 +549,8 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.
     """
+    from urdfkin.system.documents import plain  # noqa: PLC0415  --help stays fast
+
     x = _read()
     with compiling():
         found = x.robot.singular_values(x.q, x.frame, rows, base=x.base)
@@ -585,7 +568,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
                 yield Table(("", "value", "no less than", "no more than"), lines)
                 if singularity := found.singularity(k):
                     yield from str(singularity).splitlines()
-                    continue  # the manipulability has no derivative
+                    continue  # The manipulability has no derivative.
                 slopes = zip(x.rate_names, gradient[k].tolist(), strict=True)
                 yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
 
@@ -602,10 +585,10 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             "q": x.q.tolist(),
             **x.said,
             **{
-                name: {side: finite(numbers.tolist()) for side, numbers in between._asdict().items()}
+                name: plain(between._asdict())
                 for name, between in (*named, ("manipulability", found.manipulability))
             },
-            "manipulability_gradient": finite(gradient.tolist()),
+            "manipulability_gradient": plain(gradient),
             "singularities": [
                 {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
                 if one

@@ -15,10 +15,8 @@ from urdfkin.errors.escape import csv_value
 if TYPE_CHECKING:
     from urdfkin.comparison.readers import LibraryReading
 
-EXAMPLE = "urdfkin readers ur5 --with mujoco,yourdfpy"
 
-
-@click.command("readers", epilog=f"Example: {EXAMPLE}")
+@click.command("readers", epilog="Example: urdfkin readers ur5 --with mujoco,yourdfpy")
 @robot_argument
 @click.option("--with", "libraries", metavar="NAME,...", help="Libraries. Default: all that are installed.")
 @click.option(
@@ -41,7 +39,7 @@ def command(robot: str, libraries: str | None, samples: int, seed: int) -> Answe
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
     """
-    from urdfkin.comparison.readers import compare_readers  # noqa: PLC0415  keeps --help fast
+    from urdfkin.comparison.readers import compare_readers  # noqa: PLC0415  --help stays fast
 
     loaded = load_robot(robot, verify=False)
     names = None if libraries is None else [name.strip() for name in libraries.split(",")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ import click
 
 from urdfkin.cli.campaign import merge, status
 from urdfkin.cli.exit import crash, refuse
-from urdfkin.cli.options import NumberFrom, together
+from urdfkin.cli.options import NumberFrom, schema_option, together
 from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, console, write_file
 from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError, UrdfkinError
@@ -22,13 +22,9 @@ if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
 
-#: The paths and contents of the files of a report in one format. Most formats have one file; an HTML report
-#: can have a page and a folder of other files.
-Files = Iterator[tuple[Path, bytes]]
-
 _PATH = click.Path(path_type=Path, dir_okay=False)
 
-#: The options that name an output file of a report, as names of parameters.
+#: These options name an output file of a report.
 FILES = ("json_", "html", "junit", "markdown")
 report_options = together(
     click.option("--html", type=_PATH, help="Write the report as an HTML page that works offline."),
@@ -45,23 +41,21 @@ report_options = together(
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
     """Write a report in the requested formats; if one file cannot be written, write the others.
 
-    Returns:
-        0, or the exit code of the first format that could not be written. Its error has been printed.
+    The result is 0, or the exit code of the first format that could not be written. Its error has been
+    printed.
     """
-    forms = {"json_": _json, "html": _html, "junit": _junit, "markdown": _markdown}
-    codes = (_write(path, forms[name], document) for name in FILES if (path := files[name]) is not None)
-    return next(filter(None, list(codes)), 0)
+    codes = [_write(document, name, path) for name in FILES if (path := files[name]) is not None]
+    return next(filter(None, codes), 0)
 
 
 def say_written(files: Mapping[str, Path | None]) -> None:
-    """Print the names of the written files, if any."""
     if named := [str(files[name]) for name in FILES if files[name]]:
         say(f"wrote {', '.join(named)}")
 
 
-def _write(path: Path, form: Callable[[Document, Path], Files], document: Document) -> int:
+def _write(document: Document, form: str, path: Path) -> int:
     try:
-        for place, data in form(document, path):
+        for place, data in _files(document, form, path):
             if place.parent != path.parent:
                 place.parent.mkdir(exist_ok=True)
             write_file(place, data)
@@ -74,26 +68,22 @@ def _write(path: Path, form: Callable[[Document, Path], Files], document: Docume
     return 0
 
 
-def _json(document: Document, path: Path) -> Files:
-    yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
+def _files(document: Document, form: str, path: Path) -> Iterator[tuple[Path, bytes]]:
+    """Yield the path and the content of each file of a report; HTML can have a page and other files."""
+    if form == "json_":
+        yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
+    elif form == "junit":
+        from urdfkin.report.junit import as_junit  # noqa: PLC0415
 
+        yield path, as_junit(document)
+    elif form == "markdown":
+        from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
 
-def _html(document: Document, path: Path) -> Files:
-    from urdfkin.report.html import as_files  # noqa: PLC0415  draws plots
+        yield path, as_markdown(document).encode()
+    else:
+        from urdfkin.report.html import as_files  # noqa: PLC0415  this module draws plots
 
-    return ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
-
-
-def _junit(document: Document, path: Path) -> Files:
-    from urdfkin.report.junit import as_junit  # noqa: PLC0415
-
-    yield path, as_junit(document)
-
-
-def _markdown(document: Document, path: Path) -> Files:
-    from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
-
-    yield path, as_markdown(document).encode()
+        yield from ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
 
 
 EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
@@ -103,7 +93,6 @@ class _Results(click.Group):
     """The subcommands of `report`. Without a subcommand, `report FILE` means `report show FILE`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Insert `show` unless a subcommand or help is asked for."""
         if not ctx.resilient_parsing and (not args or args[0] not in (*self.commands, "-h", "--help")):
             args = ["show", *args]
         return super().parse_args(ctx, args)
@@ -122,11 +111,9 @@ def report_command() -> None:
 @click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
 @click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as JSON.")
 @report_options
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of a report and exit.")
+@schema_option("urdfkin.validation.document:VALIDATION", "a report")
 @click.pass_context
-def show(
-    context: click.Context, /, results: Path | None, cases: bool, schema: bool, **files: Path | None
-) -> None:
+def show(context: click.Context, /, results: Path | None, cases: bool, **files: Path | None) -> None:
     """Show a report or convert it to HTML, JUnit or Markdown.
 
     RESULTS can be the folder of --store, even while the validation runs. If robots are still missing in this
@@ -136,11 +123,8 @@ def show(
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
     from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
-    from urdfkin.validation.document import VALIDATION, outcome_of  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.document import outcome_of  # noqa: PLC0415  --help stays fast
 
-    if schema:
-        click.echo(VALIDATION.schema_text(), nl=False)
-        return
     if results is None:
         raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
     document = stored_document(results) if is_folder(results) else read_document(results)
@@ -183,8 +167,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     compared on fewer samples. A bound is wider. A worst disagreement grew by more than the factor and is
     above 2 eps*scale. A changed model is listed joint by joint. A changed model alone is not a regression;
     `same` and `diff` compute how far its frames move. If a report contradicts itself, for example in its
-    numbers of samples, the command exits with 2.
-    Exit 0: no regression. 1: a regression. 2: a file that cannot be used.
+    numbers of samples, the command exits with 2. Exit 0: no regression. 1: a regression. 2: a file that
+    cannot be used.
     """
     from urdfkin.report.compare import compare, document, markdown_of  # noqa: PLC0415
     from urdfkin.report.reading import read_document  # noqa: PLC0415
@@ -209,9 +193,9 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 )
 @click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--all", "all_", is_flag=True, help="Show all runs and changes, not only the latest.")
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of the data and exit.")
+@schema_option("urdfkin.report.history:HISTORY", "the data")
 @answering(*TEXTS, "json")
-def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
+def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
     """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
 
     The arguments are reports (JSON files), the folders of `validate --store`, or folders that contain both.
@@ -219,14 +203,11 @@ def report_history(paths: tuple[Path, ...], all_: bool, schema: bool) -> Answer:
     If a file was renamed, the command uses the robot's name. Changes and regressions are defined as in
     `report compare`. With `--output history.html`, the command writes an offline page with charts.
 
-    If a file cannot be used, the command prints its name and the reason, and shows the other files.
-    Exit 0: every file was used. 2: a file cannot be used.
+    If a file cannot be used, the command prints its name and the reason, and shows the other files. Exit 0:
+    every file was used. 2: a file cannot be used.
     """
-    from urdfkin.report.history import HISTORY, as_html, document, history  # noqa: PLC0415
+    from urdfkin.report.history import as_html, document, history  # noqa: PLC0415
 
-    if schema:
-        click.echo(HISTORY.schema_text(), nl=False)
-        click.get_current_context().exit()
     if not paths:
         raise click.UsageError("give reports, or a folder with reports: urdfkin report history DIR")
     found = history(paths)

@@ -64,7 +64,7 @@ def _as_dict(entry: Entry) -> dict[str, object]:
     }
 
 
-#: Data for JSON. Its module imports the tables, which the other formats do not need.
+#: Only JSON needs this module, which imports the tables.
 _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 
 
@@ -98,10 +98,7 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the rows of the table.
-
-    The first column contains the names of the links, without the lines of the drawn tree.
-    """
+    """Yield the rows of the table; the names of the links are without the lines of the drawn tree."""
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

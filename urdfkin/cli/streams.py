@@ -26,7 +26,7 @@ import click
 from urdfkin.errors import DegreesWarning, SourceError
 from urdfkin.errors.escape import COMMAND_ANYWHERE, COMMANDS, escape, printable
 
-#: Exit code when the reader of a pipe has exited: 128 + SIGPIPE, as in shells.
+#: If the reader of a pipe has exited, the exit code is 128 + SIGPIPE, as in shells.
 READER_GONE = 128 + signal.SIGPIPE
 
 
@@ -36,17 +36,12 @@ def prepare() -> None:
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
     warnings.showwarning = _warn
-    # Hide the library's warning about joint values that look like degrees: each command prints its own line
-    # about such values.
+    # Each command prints its own line about joint values that look like degrees.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
 def finish() -> None:
-    """Flush standard output while an error can still be reported.
-
-    Raises:
-        SourceError: standard output cannot be written.
-    """
+    """Flush standard output while an error can still be reported; raise SourceError if writing fails."""
     sys.stdout.flush()
 
 
@@ -63,7 +58,7 @@ class _Raw(io.FileIO):
 
     def write(self, data: Any) -> Any:
         """Write to the file until a write fails, then discard the data."""
-        if self._failed:  # Python writes again at exit
+        if self._failed:  # Python writes again at exit.
             return len(memoryview(data).cast("B"))
         try:
             return super().write(data)
@@ -122,23 +117,19 @@ def _warn(
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
-#: Matches the escape sequences that the package rich writes, for colours and for progress bars.
+#: The package rich writes these escape sequences for colours and for progress bars.
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Largest number of stored characters of an unfinished line. A CI command may be written in two pieces, so
-#: these characters are searched again together with the next piece.
+#: This many characters of an unfinished line are searched again together with the next piece.
+#: A CI command may be written in two pieces.
 _STORED = 64
 
 
 class SafeStream:
     """A text stream that escapes control characters and CI commands.
 
-    The bytes of a NumPy file are written to the attribute `buffer`, without escapes.
-
-    Args:
-        stream: The stream to write to.
-        styled: Whether the stream passes on escape sequences for colours. Set this only if nothing but the
-            package rich writes to the stream.
-        encoding: The encoding that this stream reports.
+    The bytes of a NumPy file are written to the attribute `buffer`, without escapes. Set `styled` only if
+    nothing but the package rich writes to the stream: escape sequences for colours are then not escaped.
+    `encoding` is the encoding that this stream reports.
     """
 
     def __init__(self, stream: TextIO, *, styled: bool = False, encoding: str | None = None) -> None:
@@ -148,7 +139,6 @@ class SafeStream:
         self._line = ""
 
     def write(self, text: str) -> int:
-        """Write text with control characters and CI commands escaped."""
         pieces = _STYLE.split(text) if self.styled else [text]
         self._pass(
             "".join(
@@ -158,7 +148,6 @@ class SafeStream:
         return len(text)
 
     def write_commands(self, text: str) -> None:
-        """Write commands for a CI service."""
         self._pass(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
 
     def write_file(self, text: str) -> None:
@@ -192,8 +181,8 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Of a long line, store only the last 16 characters. An "x" before them means that the removed text
-        # was not blank.
+        # Only the last 16 characters of a long line are stored.
+        # An "x" before them means that the removed text was not blank.
         self._line = whole if len(whole) <= _STORED else ("x" if whole.strip() else "") + whole[-16:]
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
 
@@ -232,7 +221,6 @@ def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
 
 
 def say_file(text: str) -> None:
-    """Write a file's text to standard output."""
     SafeStream(sys.stdout).write_file(text)
 
 

@@ -28,7 +28,7 @@ class Terminal(Console):
         if self.is_terminal or only_text:
             super().print(*texts, **{"soft_wrap": only_text} | options)
             return
-        # Remove the blanks with which rich pads the lines of a table.
+        # The package rich pads the lines of a table with blanks.
         with self.capture() as capture:
             super().print(*texts, **options)
         self.file.write(_TRAILING.sub("", capture.get()))

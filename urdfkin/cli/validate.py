@@ -56,20 +56,18 @@ def judge_all(
     robots.
 
     Args:
-        report: The report of `validate` for the same robots, in the same order.
+        report: The report of `validate` for the same robots, in the same order. With `shard`, the report of
+            this part.
         given: Robots, or their sources.
         settings: Settings of the study.
         store: Folder of --store, into which the results of the study are also written; None: no folder.
         shard: The value I/N of --shard. This process studies only the robots whose first samples belong to
-            part I. `report` must be the report of part I.
+            part I.
         retry: Whether to repeat the study of a robot whose study failed in an earlier run.
         how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
-
-    Returns:
-        The report with the results of the study.
     """
     from urdfkin.validation.accuracy_store import NotJudged  # noqa: PLC0415
-    from urdfkin.validation.campaign import shares  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.campaign import shares  # noqa: PLC0415  --help stays fast
     from urdfkin.validation.chunk import Cut  # noqa: PLC0415
 
     parts = shares(len(given), Cut(report.samples), shard)
@@ -103,7 +101,7 @@ def _open_results(
     if folder is None:
         yield None
         return
-    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  --help stays fast
     from urdfkin.validation.store import Store, opened  # noqa: PLC0415
 
     def tell(message: str) -> None:
@@ -119,7 +117,7 @@ def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[Judgement | NotJudged, bool]:
     """Study a robot. Return the accuracy result, and whether to store it (not after a crash)."""
-    import numpy as np  # noqa: PLC0415  keeps --help fast
+    import numpy as np  # noqa: PLC0415  --help stays fast
 
     from urdfkin.model.configuration import draw_base  # noqa: PLC0415
     from urdfkin.validation.accuracy import judge  # noqa: PLC0415
@@ -142,18 +140,16 @@ def _study(
 
 
 _T = TypeVar("_T", bound=click.Command)
-EXAMPLE = "urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0"
 
 
 def _with_quantities(command: _T) -> _T:
-    """Insert the names of the compared quantities into the help."""
     assert command.help is not None
     command.help = command.help.format(compared=compared(), not_compared=not_compared())
     return command
 
 
 @_with_quantities
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin validate panda ur5 ./my.urdf --samples 1000 --seed 0")
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...", shell_complete=complete_robot)
 @click.option(
     "--all", "all_", is_flag=True, help="Validate all robots of example-robot-data in the catalogue."
@@ -284,12 +280,11 @@ def command(
 
 @contextmanager
 def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
-    """Connect to the requested cluster and print its messages."""
     if scheduler is None:
         yield None
         return
     try:
-        from urdfkin.validation.cluster import connected  # noqa: PLC0415  an extra
+        from urdfkin.validation.cluster import connected  # noqa: PLC0415  this module needs an extra
     except ImportError:
         raise InputError("--scheduler needs dask.distributed", remedy=install_remedy("cluster")) from None
     with connected(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
@@ -298,14 +293,14 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
     """Load standard input now: it can be read only once, and the accuracy study needs it later."""
-    from urdfkin.robot.loading import load  # noqa: PLC0415  keeps --help fast
+    from urdfkin.robot.loading import load  # noqa: PLC0415  --help stays fast
 
     return load(source, **how) if source == "-" else source
 
 
 def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
     """Load a USD stage now, with its variants and its articulation; another robot is returned as it is."""
-    from urdfkin.urdf.sources import is_usd  # noqa: PLC0415  keeps --help fast
+    from urdfkin.urdf.sources import is_usd  # noqa: PLC0415  --help stays fast
 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}
     if not isinstance(source, str) or not is_usd(source):
@@ -315,7 +310,7 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
     """Print the result of a shard; a full report is possible only after the shards are merged."""
-    from urdfkin.report.words import counted  # noqa: PLC0415  keeps --help fast
+    from urdfkin.report.words import counted  # noqa: PLC0415  --help stays fast
 
     for robot in report.robots:
         if robot.reason is not None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.completion import complete_robot
-from urdfkin.cli.options import Whole, load_robot
+from urdfkin.cli.options import Whole, load_robot, schema_option
 from urdfkin.cli.output import Answer, answering
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.display import Table, TextDocument
@@ -46,11 +46,9 @@ def vectors_command() -> None:
     show_default=True,
     help="Configurations of each robot. The first is the zero configuration.",
 )
-@click.option("--schema", is_flag=True, help="Print the JSON Schema of a file and exit.")
+@schema_option("urdfkin.validation.vectors:VECTORS", "a file")
 @answering()
-def write_command(
-    folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int, schema: bool
-) -> Answer:
+def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
     Without ROBOT, the command writes the vectors of the robots of the catalogue, and of some 70 small robots.
@@ -62,11 +60,8 @@ def write_command(
     spatial acceleration. The files contain the placement once, and each other quantity in the frames LOCAL,
     WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and --samples.
     """
-    from urdfkin.validation import vectors  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation import vectors  # noqa: PLC0415  --help stays fast
 
-    if schema:
-        click.echo(vectors.VECTORS.schema_text(), nl=False)
-        click.get_current_context().exit()
     if folder is None:
         raise click.UsageError("name the folder for the files: urdfkin vectors write DIR")
     loaded = [load_robot(robot, verify=False) for robot in robots]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: The quantities that can be checked. Your function returns one result for each configuration.
+#: A function returns one result of these quantities for each configuration.
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
 
 
@@ -110,7 +110,7 @@ def verify_command(
     wrong frame, reference frame, joint order, sign or unit, or a missing term. Exit code 0: all results
     agree; 1: they do not; 3: no oracle can check the robot.
     """
-    from urdfkin.validation.functions import verify_function  # noqa: PLC0415  keeps --help fast
+    from urdfkin.validation.functions import verify_function  # noqa: PLC0415  --help stays fast
     from urdfkin.validation.programs import Program  # noqa: PLC0415
 
     check_writable(junit)
@@ -157,7 +157,6 @@ def verify_command(
 
 
 def _document(checks: Sequence[FunctionCheck]) -> TextDocument:
-    """Return the document of a single check, or one document with the results of several checks."""
     sheets = [check._sheet() for check in checks]
     if len(sheets) == 1:
         return sheets[0]
@@ -189,10 +188,7 @@ def _stated(function: str) -> str | None:
 
 
 def _functions(target: str) -> dict[str, Callable[..., object]]:
-    """Return the function of FILE.py:FUNCTION.
-
-    For FILE.py without a function's name, return each function whose name contains a quantity.
-    """
+    """Return the function of FILE.py:FUNCTION, or each function of FILE.py that names a quantity."""
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
         raise InputError(
@@ -222,14 +218,13 @@ def _module(path: str) -> ModuleType:
     file = Path(path).resolve()
     if not file.is_file():
         raise SourceError("no such file", where=path)
-    name = f"_urdfkin_checks_{file.stem}"  # not `file.stem`, which could be the name of an installed module
+    name = f"_urdfkin_checks_{file.stem}"  # An installed module could have the name `file.stem`.
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    # Append the file's folder to the end of sys.path, so that no file in the folder hides an installed
-    # module.
+    # The folder is last in sys.path, so that its files hide no installed module.
     sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)

@@ -24,10 +24,8 @@ from urdfkin.cli.output import compiling
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 
-EXAMPLE = "urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04"
 
-
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin view panda --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04")
 @robot_argument
 @click.option(
     "--host",
@@ -66,11 +64,7 @@ def command(
     The printed address ends with a secret key. Open the address with its key, and show it only to people who
     may see and move the robot. Other web pages and other users of this machine have no access.
     """
-    from urdfkin.view.server import (  # noqa: PLC0415
-        has_screen,
-        new_server,
-        opened_page,
-    )
+    from urdfkin.view.server import has_screen, new_server, opened_page  # noqa: PLC0415
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
     loaded = load_robot(robot)
@@ -99,7 +93,7 @@ def command(
         Viewer(server, loaded, None if begin is None else begin[0], played, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # otherwise a pipe gets the address too late
+        sys.stdout.flush()  # A pipe would get the address too late.
         wanted = sys.stdout.isatty() and has_screen() if browser is None else browser
         with opened_page(server.address) if wanted else nullcontext():
             server.sleep_forever()

@@ -9,10 +9,8 @@ import click
 from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError
 
-EXAMPLE = "urdfkin warm"
 
-
-@click.command(epilog=f"Example: {EXAMPLE}")
+@click.command(epilog="Example: urdfkin warm")
 def command() -> None:
     """Compile every kernel for this machine and store it, for container images and CI.
 

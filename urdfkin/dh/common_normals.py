@@ -54,13 +54,12 @@ from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUM
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Two axes with a smaller tilt (rad) are nearly parallel. If a number in the URDF has an error, the error of
-#: their common normal's position is more than 100 times as large.
+#: Two axes with a smaller tilt (rad) are nearly parallel.
+#: An error of a number in the URDF then moves their common normal by more than 100 times the error.
 NEARLY_PARALLEL = 1e-2
 
-#: Two axes with a larger tilt (rad) are never treated as nearly parallel. If the tilt is between
-#: `NEARLY_PARALLEL` and this number, the axes are treated as nearly parallel only if their common normal is
-#: far away.
+#: Two axes with a larger tilt (rad) are never treated as nearly parallel.
+#: From `NEARLY_PARALLEL` to this tilt, axes are nearly parallel only if their common normal is far away.
 FAR_FEET = 0.35
 
 
@@ -74,8 +73,6 @@ class NearParallel(StrEnum):
 @dataclass(frozen=True, slots=True)
 class Step:
     """The seven numbers of the transform between two joint axes, in metres and radians.
-
-    The module's docstring contains the formula with these numbers.
 
     Attributes:
         free: Whether `phi` was a free choice because the axes coincide.
@@ -93,15 +90,8 @@ class Step:
     def turned(self) -> Step:
         """Return the numbers for the same two axes and the opposite direction of x."""
         alpha = math.pi if self.alpha == math.pi else -self.alpha
-        return Step(
-            self.phi + math.pi,
-            self.delta,
-            -self.a,
-            alpha,
-            -self.beta,
-            self.phi_next - math.pi,
-            self.delta_next,
-        )
+        phi, phi_next = self.phi + math.pi, self.phi_next - math.pi
+        return replace(self, phi=phi, a=-self.a, alpha=alpha, beta=-self.beta, phi_next=phi_next, free=False)
 
 
 def lifted(A: FloatArray, carry: float) -> FloatArray:
@@ -130,9 +120,6 @@ def step_between(
         delta_each: For parallel axes: True if `delta` contains the offset, False if `delta_next` contains it.
         noise: Limits for tilts and lengths; smaller values are set to zero. None: the limits for the origin
             of a single URDF joint.
-
-    Returns:
-        The step.
     """
     noise = noise or noise_of(1, 0.0, reach)
     sine = tilt_of(A)
@@ -199,29 +186,19 @@ def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> S
 
 
 def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
-    """Return the angle phi_next (rad), computed from A and the angles phi, alpha and beta.
-
-    The formula is accurate for every tilt.
-    """
+    """Return phi_next (rad) by a formula that is accurate for every tilt."""
     turn_phi = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
     M = (turn_phi @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
 
 
 def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
-    """Return a length without rounding noise.
+    """Return a length (metres) without rounding noise.
 
-    If the length is 0 within rounding error, the function returns 0. If the length differs from a decimal
-    number of twelve digits only by rounding error, the function returns the decimal number. Otherwise, it
-    returns the length unchanged.
+    `reach` is the magnitude of the numbers from which the length was computed. If the length is below `noise`
+    or the rounding error of `reach`, the function returns 0. If the length differs from a decimal number of
+    twelve digits only by rounding error, the function returns the decimal number.
 
-    Args:
-        length: Metres.
-        reach: Magnitude (metres) of the numbers from which the length was computed.
-        noise: Metres; a length below `noise` becomes zero. If the rounding error of `reach` is larger than
-            `noise`, the rounding error is the limit.
-
-    Example:
         >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
         (0.0, 0.076, -5e-12)
     """
@@ -232,10 +209,7 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 
 def cleaned_angle(angle: float) -> float:
-    """Return the angle in (-pi, pi].
-
-    An angle within rounding error of a multiple of pi/12 becomes this multiple.
-    """
+    """Return the angle in (-pi, pi]; within rounding error of a multiple of pi/12, return this multiple."""
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
     return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
@@ -250,7 +224,6 @@ class PairLike:
         row: The other table's row.
         reach: Metres; see `cleaned_length`.
         noise: Noise of the pose.
-        near_parallel: Kind of row for nearly parallel axes.
     """
 
     A: FloatArray
@@ -261,7 +234,6 @@ class PairLike:
 
     @property
     def slides(self) -> bool:
-        """Whether the first of the two joints is prismatic."""
         return not self.row.kind.turns
 
     @property
@@ -293,13 +265,12 @@ class PairLike:
     def cut(self) -> float | None:
         """Distance (metres) along the first axis from the joint's frame to the x axis of the Hayati row.
 
-        This x axis lies in a plane normal to the first axis.
-
-        The next axis intersects the plane in a point. In the other table, the cell a is the distance of this
-        point from the first axis. The component of a in the direction of the tilt determines the position of
-        the plane. The position error is then the rounding error divided by the tilt. For a slight tilt,
-        urdfkin computes this component from a and from the component normal to the tilt. This formula is then
-        more accurate. The result is None if the plane is farther away than `reach`.
+        This x axis lies in a plane normal to the first axis. The next axis intersects the plane in a point.
+        In the other table, the cell a is the distance of this point from the first axis. The component of a
+        in the direction of the tilt determines the position of the plane. The position error is then the
+        rounding error divided by the tilt. For a slight tilt, urdfkin computes this component from a and from
+        the component normal to the tilt, which is more accurate. The result is None if the plane is farther
+        away than `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, lean = tilt_of(self.A), math.hypot(along, across)
@@ -341,19 +312,13 @@ class PairLike:
 def steps_like(
     pairs: Sequence[PairLike], phi_in: float, carry: float, tip: float | None
 ) -> tuple[list[Step], list[float]]:
-    """Compute the transforms between consecutive axes of a path.
+    """Compute the transforms between consecutive axes of a path, and theta of each row.
 
-    If a number can be chosen freely, the function copies the number from another table.
-
-    Args:
-        pairs: All pairs of consecutive axes.
-        phi_in: Angle about the first axis from frame 0 to the first joint's frame (rad).
-        carry: Offset along the first axis from frame 0 to the first joint's frame (metres).
-        tip: Offset (metres) before the last row. With this offset, d of the last row equals d in the other
-            table. None: these two numbers may differ, and the last row or the tool contains the difference.
-
-    Returns:
-        The parameters of the transforms between consecutive axes, and theta of each row.
+    If a number can be chosen freely, the function copies the number from another table. `phi_in` (rad) and
+    `carry` (metres) are the angle about the first axis and the offset along it, from frame 0 to the first
+    joint's frame. With the offset `tip` (metres) before the last row, d of the last row equals d in the other
+    table. If `tip` is None, these two numbers may differ, and the last row or the tool contains the
+    difference.
     """
     steps, inputs = list[Step](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -386,8 +351,8 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
     if end < len(pairs):
         target = None if pairs[end].slides else pairs[end].row.d - pairs[end].foot
     if target is None:
-        # The remaining offset becomes part of d of a later prismatic joint, or of the tool. If there is a
-        # Hayati row in between, the plane of its x axis may determine d.
+        # The remaining offset becomes part of d of a later prismatic joint, or of the tool.
+        # If there is a Hayati row in between, the plane of its x axis may determine d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         cut = pairs[end].cut
         if cut is None:
@@ -438,32 +403,22 @@ def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
 
 
 def near(theta: float, there: float) -> float:
-    """Return `theta` in (-pi, pi]. If `theta` and `there` differ only by rounding error, return `there`."""
     off = math.remainder(theta - there, 2.0 * math.pi)
     return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
 
 
-#: Largest allowed length (metres).
-#: Longer lengths cause an overflow, because common normals and bounds contain squares of sums of lengths.
+#: Squares of sums of longer lengths (metres) overflow in common normals and bounds.
 LONGEST = 1e150
 
 
 def demand_squares(joints: Iterable[Joint]) -> None:
-    """Check that the square of each joint's offset is a finite double.
-
-    Raises:
-        RangeError: an offset is longer than `LONGEST`.
-    """
+    """Raise RangeError unless the square of each joint's offset is a finite double."""
     for joint in joints:
         _check_length(f"joint {joint.name}", float(np.abs(joint.T_parent_joint[:3, 3]).max()))
 
 
 def demand_squares_of(chain: FrameChain, table: DHTable) -> None:
-    """Check that the square of each length of a path and of a table is a finite double.
-
-    Raises:
-        RangeError: a length is larger than `LONGEST`.
-    """
+    """Raise RangeError unless the square of each length of a path and of a table is a finite double."""
     for i, row in enumerate(table.rows):
         for name, length in (("a", row.a), ("d", row.d)):
             _check_length(f"the table, row {i + 1}, {name}", abs(length))
@@ -494,12 +449,9 @@ class Noise:
 def noise_of(joints: int, length: float, reach: float) -> Noise:
     """Return the largest angle and length that are treated as rounding errors in a constant pose.
 
-    Args:
-        joints: Number of URDF joints whose origins are multiplied to give the constant pose.
-        length: Sum of the offsets of these joints (metres).
-        reach: Length of the whole path (metres).
+    The pose is the product of the origins of `joints` URDF joints; `length` is the sum of their offsets
+    (metres), and `reach` the length of the whole path (metres).
 
-    Example:
         >>> round(noise_of(1, 0.1, 1.0).radians / EPS, 1), round(noise_of(1, 0.1, 1.0).metres / EPS, 1)
         (63.7, 4.0)
     """
@@ -508,7 +460,6 @@ def noise_of(joints: int, length: float, reach: float) -> Noise:
 
 
 def noises(chain: FrameChain, reach: float) -> list[Noise]:
-    """Return the largest rounding errors of each constant pose of a chain."""
     return [
         noise_of(joints, float(length), reach)
         for joints, length in zip(chain.folded, chain.lengths, strict=True)

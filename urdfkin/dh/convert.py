@@ -25,7 +25,16 @@ from dataclasses import replace
 import numpy as np
 
 from urdfkin.dh.table import Convention, DHRow, DHTable, as_step, convention_of
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
+from urdfkin.model.tree import (
+    FloatArray,
+    Joint,
+    JointKind,
+    KinematicTree,
+    Limit,
+    Mimic,
+    build_tree,
+    is_bounded,
+)
 from urdfkin.urdf.writer import to_urdf as write_urdf
 
 
@@ -67,7 +76,7 @@ def _with(
     return replace(table, convention=convention, rows=rows, base=base, tool=tool)
 
 
-#: Limits that a prismatic joint without limits gets in a URDF: -1 km to 1 km, 1000 m/s, 1000 N.
+#: A prismatic joint without limits gets -1 km to 1 km, 1000 m/s and 1000 N in a URDF.
 UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
@@ -78,16 +87,9 @@ def to_tree(table: DHTable) -> KinematicTree:
     joint is not on the path, it becomes a separate joint on the base, so that the tree has the same
     coordinates as the table. A revolute joint without limits becomes continuous. A prismatic joint without
     limits gets -1 km to 1 km, because URDF requires limits.
-
-    Args:
-        table: Any table.
     """
-    joints, here = list[tuple[Joint, str, str]](), link_names(table)
-    for i, (row, T) in enumerate(zip(table.rows, frame_poses(table)[:-1], strict=True)):
-        axis = np.array([0.0, 0.0, float(row.sense)])
-        joint = Joint(row.joint, _kind(row), 0, T, axis, _limit(row), row.mimic)
-        joints.append((joint, here[i], here[i + 1]))
-    joints.append((_fixed(f"{table.tip_frame}_fixed", frame_poses(table)[-1], table), here[-2], here[-1]))
+    here = link_names(table)
+    joints = _serial(table, here, [(_kind(row), _limit(row), row.mimic) for row in table.rows])
     names = {row.joint for row in table.rows}
     for leader in table.joint_names:
         if leader not in names:
@@ -99,23 +101,28 @@ def to_tree(table: DHTable) -> KinematicTree:
 
 
 def to_urdf(table: DHTable) -> str:
-    """Return a URDF of the table's robot, with the names and limits of `to_tree`.
-
-    The URDF has no shapes and no masses.
-    """
+    """Return a URDF with the names and limits of `to_tree`, and without shapes and masses."""
     return write_urdf(to_tree(table))
 
 
 def free_tree(table: DHTable) -> KinematicTree:
     """Return the tree of `to_tree` without mimic rules: each row has its own coordinate, in row order."""
-    joints, here = list[tuple[Joint, str, str]](), link_names(table)
-    poses = frame_poses(table)
-    for i, row in enumerate(table.rows):
-        axis = np.array([0.0, 0.0, float(row.sense)])
-        kind = JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC
-        joints.append((Joint(row.joint, kind, 0, poses[i], axis), here[i], here[i + 1]))
-    joints.append((_fixed(f"{table.tip_frame}_fixed", poses[-1], table), here[-2], here[-1]))
-    return build_tree(table.robot, here[0], joints)
+    kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
+    here = link_names(table)
+    return build_tree(table.robot, here[0], _serial(table, here, [(kind, None, None) for kind in kinds]))
+
+
+def _serial(
+    table: DHTable, links: list[str], details: list[tuple[JointKind, Limit | None, Mimic | None]]
+) -> list[tuple[Joint, str, str]]:
+    """Return the joints of the rows and the fixed joint of the tip, each with its parent and child link."""
+    *poses, T_tip = frame_poses(table)
+    joints = [
+        Joint(row.joint, kind, 0, T, np.array([0.0, 0.0, float(row.sense)]), limit, mimic)
+        for row, T, (kind, limit, mimic) in zip(table.rows, poses, details, strict=True)
+    ]
+    joints.append(_fixed(f"{table.tip_frame}_fixed", T_tip, table))
+    return list(zip(joints, links, links[1:], strict=False))
 
 
 def frame_poses(table: DHTable) -> list[FloatArray]:

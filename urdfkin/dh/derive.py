@@ -36,8 +36,8 @@ from urdfkin.dh.common_normals import (
     steps_like,
     tilt_of,
 )
-from urdfkin.dh.table import Convention, DHRow, DHTable, along_axis, as_step, between_axes, convention_of
-from urdfkin.errors import InputError, UnknownNameError
+from urdfkin.dh.table import Convention, DHRow, DHTable, along_axis, as_step, between_axes
+from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import ChainJoint, FrameChain
 from urdfkin.model.tree import FloatArray
@@ -90,8 +90,6 @@ class ParallelOffset(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """The options of a derivation; `urdfkin.dh.dh_table` explains them."""
-
     convention: Convention = Convention.STANDARD
     near_parallel: NearParallel = NearParallel.HAYATI
     last: Last = Last.TIP
@@ -105,7 +103,7 @@ class Choices:
 _Choice = TypeVar("_Choice", bound=StrEnum)
 
 
-def _choice(kind: type[_Choice], name: str, value: str) -> _Choice:
+def choice(kind: type[_Choice], name: str, value: str) -> _Choice:
     try:
         return kind(value)
     except ValueError:
@@ -113,46 +111,13 @@ def _choice(kind: type[_Choice], name: str, value: str) -> _Choice:
         raise InputError(f"unknown value of `{name}`", found=repr(value), remedy=f"write {known}") from None
 
 
-def choices_of(
-    chain: FrameChain,
-    *,
-    convention: str,
-    near_parallel: str,
-    last: str,
-    parallel_offset: str,
-    flip: Collection[str],
-    first: str = "base",
-    sign: str = "theta",
-    slide: str = "drawn",
-) -> Choices:
-    """Return the options with the given names; raise InputError or UnknownNameError for an unknown name."""
-    names = [joint.name for joint in chain.joints]
-    for name in flip:
-        if name not in names:
-            raise UnknownNameError("joint", name, names, where=f"path {chain.base} to {chain.tip}")
-    return Choices(
-        convention_of(convention),
-        _choice(NearParallel, "near_parallel", near_parallel),
-        _choice(Last, "last", last),
-        _choice(ParallelOffset, "parallel_offset", parallel_offset),
-        tuple(flip),
-        _choice(First, "first", first),
-        _choice(Sign, "sign", sign),
-        _choice(Slide, "slide", slide),
-    )
-
-
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
     """Return the table of a chain.
 
-    The product base . rows . tool equals the pose of the chain's tip for every q, except for rounding.
-
-    Args:
-        chain: The path.
-        choices: The options.
-        like: A standard table of the same joints. The result has the same directions of x and the same
-            offsets along parallel axes. The zero positions of the first and the last joint are also the same.
-            If `like` and `choices` contradict each other, `like` is used.
+    The product base . rows . tool equals the pose of the chain's tip for every q, except for rounding. `like`
+    is a standard table of the same joints. The result has the same directions of x, the same offsets along
+    parallel axes, and the same zero positions of the first and the last joint. If `like` and `choices`
+    contradict each other, `like` is used.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -194,7 +159,6 @@ def _table(
     steps: list[Step],
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
-    """Make the table in the chosen convention."""
     if choices.convention is Convention.MODIFIED and turns:
         first = as_step(ends[0])
         a, alpha = first or (0.0, 0.0)
@@ -209,18 +173,9 @@ def _table(
 
 def _row(joint: ChainJoint, turn: tuple[float, float], step: Step, sense: int) -> DHRow:
     theta, d = turn
-    return DHRow(
-        step.a + 0.0,
-        step.alpha + 0.0,
-        d + 0.0,
-        theta + 0.0,
-        joint.kind,
-        joint.name,
-        sense,
-        step.beta + 0.0,
-        joint.mimic,
-        joint.limit,
-    )
+    # The sum with 0.0 makes a negative zero positive.
+    a, alpha, d, theta, beta = (x + 0.0 for x in (step.a, step.alpha, d, theta, step.beta))
+    return DHRow(a, alpha, d, theta, joint.kind, joint.name, sense, beta, joint.mimic, joint.limit)
 
 
 # -- before the pass -----------------------------------------------------------------------------------
@@ -245,25 +200,17 @@ def _use_freedom_of_prismatic_axes(
     A prismatic motion commutes with every translation. Therefore, the axis line of a prismatic joint can be
     shifted without a change of the tip's poses. If the first joint is prismatic, its axis line passes through
     the base's origin, so that the base can be the identity. If the last joint is prismatic, its axis line
-    passes through the tip, unless the table needs a tool anyway. In a table without Hayati rows, urdfkin
-    checks whether a prismatic axis is nearly parallel to the axis of a neighbouring joint. If the prismatic
-    axis is nearly parallel, its line is shifted to the origin of the neighbouring joint. Otherwise, the
-    common normal would be far from the robot.
+    passes through the tip, unless the table needs a tool anyway. In a table without Hayati rows, a prismatic
+    axis that is nearly parallel to a neighbouring axis is shifted to the origin of the neighbouring joint.
+    Otherwise, the common normal would be far from the robot.
     """
     slides = [not joint.kind.turns for joint in chain.joints]
     noise = noises(chain, reach)
     n = len(slides)
     minimal = choices.slide is Slide.MINIMAL
     moved = [slides[k] and minimal and _onto_neighbour(constants, k, slides) for k in range(n)]
-    moved = [
-        moved[k]
-        or (
-            slides[k]
-            and choices.near_parallel is NearParallel.STRICT
-            and _meets_neighbour(constants, k, noise)
-        )
-        for k in range(n)
-    ]
+    strict = choices.near_parallel is NearParallel.STRICT
+    moved = [moved[k] or (slides[k] and strict and _meets_neighbour(constants, k, noise)) for k in range(n)]
     if slides[0] and not moved[0]:
         _shift_after(constants, 0, constants[0][:3, :3].T @ constants[0][:3, 3])
         moved[0] = True
@@ -325,9 +272,9 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
     base[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in p - offset * z]
     if tilt_of(A) <= noise.radians:  # z_0 is parallel or opposite to the base's z axis
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # This is x - (x . z) z for unit vectors, in a form that avoids cancellation for z close to x.
+    # This formula for x - (x . z) z with unit vectors avoids cancellation for z close to x.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis, so use the y axis
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis.
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -337,7 +284,6 @@ def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, 
 
 
 def _clean_rotation(T: FloatArray) -> None:
-    """Set the entries of the rotation that are rounding noise to zero."""
     R = T[:3, :3]
     R[np.abs(R) <= ENTRY * EPS] = 0.0
 
@@ -469,8 +415,7 @@ def _last(
 def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
     """Add the offsets along consecutive parallel axes, and write the sum into the first row of these axes.
 
-    If two axes have the same direction (alpha = 0), the offset along the second axis is added. If the axes
-    have opposite directions (alpha = pi), the offset along the second axis is subtracted.
+    The offset along the second of two axes is added if alpha = 0, and subtracted if alpha = pi.
     """
     moved = list(rows)
     for i in range(len(steps) - 1, -1, -1):

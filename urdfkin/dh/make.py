@@ -17,20 +17,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.common_normals import demand_squares
+from urdfkin.dh.common_normals import NearParallel, demand_squares
 from urdfkin.dh.compare.agreement import check_joints
 from urdfkin.dh.compare.fit import align
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.derive import Choices, choices_of, derive
+from urdfkin.dh.derive import Choices, First, Last, ParallelOffset, Sign, Slide, choice, derive
 from urdfkin.dh.snapping import checked_tolerance, row_of_constant, snap_chain, snap_thetas, statement
-from urdfkin.dh.table import Convention, DHTable
-from urdfkin.errors import InputError, Question
+from urdfkin.dh.table import Convention, DHTable, convention_of
+from urdfkin.errors import InputError, Question, UnknownNameError
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: A table whose cells differ by more than `_ANOTHER` describes another robot. The number is in rad for
-#: angles, and relative to the reach for lengths. Two zero positions of a joint are different if their angles
-#: differ by more than `_OTHER`.
+#: A table whose cells differ by more than `_ANOTHER` (rad, or relative to the reach) describes another robot.
+#: Two zero positions of a joint are different if their angles (rad) differ by more than `_OTHER`.
 _ANOTHER, _OTHER = 0.1, 1e-2
 #: Two cells with a smaller difference (relative to the reach, or in rad) are treated as equal.
 _ROUNDING = 1e-12
@@ -39,10 +38,7 @@ _ROUNDING = 1e-12
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
     """Return a chain's table with the same frames as another table, in the convention of `choices`.
 
-    Args:
-        chain: The path.
-        choices: The options. The attribute `flip` must contain the joints from `reversed_like`.
-        reference: The other table.
+    The attribute `flip` of `choices` must contain the joints from `reversed_like`.
     """
     standard = replace(choices, convention=Convention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
@@ -51,8 +47,7 @@ def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTa
 def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tuple[str, ...]:
     """Return the names of the joints that have opposite positive directions in the table and in the URDF.
 
-    Raises:
-        InputError: the table has other joints, or describes another robot.
+    If the table has other joints, or describes another robot, InputError is raised.
     """
     check_joints(chain, reference)
     there = to_convention(reference, "standard")
@@ -95,7 +90,7 @@ def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float
     n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
         apart = abs(row.a - other.a) / reach
-        if i < n - 1:  # base and tool contain the transforms before the first axis and after the last axis
+        if i < n - 1:  # Base and tool contain the transforms outside the axes.
             placed = row.kind.turns and found.rows[i + 1].kind.turns
             cells = max(cells, abs(_angle(row.alpha, other.alpha)), apart * placed)
             lines = max(lines, abs(row.beta - other.beta), apart)
@@ -169,19 +164,22 @@ def dh_table(
         RangeError: the square of a length is outside the range of doubles.
     """
     exact = chain(tree, tip, base)
-    # Check the whole path from the root, because Pinocchio computes poses relative to the root.
+    # The whole path from the root is checked, because Pinocchio computes poses relative to the root.
     ends = [tip] if base is None else [base, tip]
     demand_squares(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
-    choices = choices_of(
-        exact,
-        convention=convention,
-        near_parallel=near_parallel,
-        last=last,
-        parallel_offset=parallel_offset,
-        flip=flip,
-        first=first,
-        sign=sign,
-        slide=slide,
+    names = [joint.name for joint in exact.joints]
+    for name in flip:
+        if name not in names:
+            raise UnknownNameError("joint", name, names, where=f"path {exact.base} to {exact.tip}")
+    choices = Choices(
+        convention_of(convention),
+        choice(NearParallel, "near_parallel", near_parallel),
+        choice(Last, "last", last),
+        choice(ParallelOffset, "parallel_offset", parallel_offset),
+        tuple(flip),
+        choice(First, "first", first),
+        choice(Sign, "sign", sign),
+        choice(Slide, "slide", slide),
     )
     if like is not None:
         choices = replace(choices, flip=reversed_like(exact, choices, like))

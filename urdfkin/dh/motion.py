@@ -22,13 +22,12 @@ from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-#: Number of compiled tables in the cache.
+#: Number of cached compiled tables
 _TABLES = 64
 
 
 @lru_cache(_TABLES)
 def plan_of(table: DHTable) -> CompiledTree:
-    """Return the compiled tree of a table's frames, from base to tip."""
     tree = free_tree(table)
     return compile_tree(tree, [len(tree.links) - 1])
 
@@ -38,13 +37,8 @@ def jacobian(
 ) -> FloatArray:
     """Return the (..., 6, coordinates) Jacobian of the tip, [linear; angular] (7.85).
 
-    Args:
-        table: Any table.
-        q: (..., coordinates) in the order of `joint_names`, rad or m, or a mapping by name.
-        reference: LOCAL, WORLD or LOCAL_WORLD_ALIGNED; the world is the table's base frame.
-
-    Raises:
-        InputError: `q` has the wrong length.
+    `q` (..., coordinates) is in the order of `joint_names` (rad or m), or a mapping by name. The world is the
+    table's base frame. If `q` has the wrong length, InputError is raised.
     """
     shape, (values,) = _flat(table, table.coupling.values(q))
     J = jacobians(plan_of(table), values, Reference.of(reference))[:, 0] @ table.coupling.matrix
@@ -54,16 +48,9 @@ def jacobian(
 def velocity(
     table: DHTable, q: Given, v: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """Return the (..., 6) velocity of the tip, [linear; angular] (7.127, 7.128).
+    """Return the (..., 6) velocity of the tip, [linear; angular] (7.127, 7.128); batches broadcast.
 
-    Args:
-        table: Any table.
-        q: (..., coordinates), rad or m, or a mapping by name.
-        v: (..., coordinates), rad/s or m/s; batches broadcast.
-        reference: LOCAL, WORLD or LOCAL_WORLD_ALIGNED; the world is the table's base frame.
-
-    Raises:
-        InputError: an array has the wrong length.
+    The arguments are as in `jacobian`, with `v` in rad/s or m/s.
     """
     shape, (values, rates) = _flat(table, table.coupling.values(q), _joint_derivatives(table, v, "v"))
     return velocities(plan_of(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
@@ -74,15 +61,7 @@ def acceleration(
 ) -> FloatArray:
     """Return the (..., 6) classical acceleration of the tip, [linear; angular] (7.129, 7.130).
 
-    Args:
-        table: Any table.
-        q: (..., coordinates), rad or m, or a mapping by name.
-        v: (..., coordinates), rad/s or m/s.
-        a: (..., coordinates), rad/s^2 or m/s^2; batches broadcast.
-        reference: LOCAL, WORLD or LOCAL_WORLD_ALIGNED; the world is the table's base frame.
-
-    Raises:
-        InputError: an array has the wrong length.
+    The arguments are as in `velocity`, with `a` in rad/s^2 or m/s^2.
     """
     arrays = (table.coupling.values(q), _joint_derivatives(table, v, "v"), _joint_derivatives(table, a, "a"))
     shape, (values, velocities_, accelerations_) = _flat(table, *arrays)

@@ -1,15 +1,10 @@
 """Read tables from TOML files, JSON files, and plain text that you copy from a document or web page.
 
-`urdfkin.dh.rows` defines the content of TOML and JSON files.
-
-A table in text has a line of headings that contains a, alpha, d and theta in any order. Below the headings
-there is a line for each joint. Commas, semicolons, tabs, bars, ampersands or blanks separate the cells. The
-lines before and after the table may state the convention, names, base and tool. urdfkin prints its own tables
-in this form. The result is plain data for `urdfkin.dh.rows`. The module never guesses. For example, a table
-without a convention is an error in `urdfkin.dh.rows`.
-
-`references` finds the reference tables in urdfkin. The reference tables come from vendors and textbooks, and
-each table states its source.
+`urdfkin.dh.rows` defines the content of TOML and JSON files. A table in text has a line of headings that
+contains a, alpha, d and theta in any order, and below it a line for each joint. Commas, semicolons, tabs,
+bars, ampersands or blanks separate the cells. The lines before and after the table may state the convention,
+names, base and tool. urdfkin prints its own tables in this form. The module never guesses. For example, a
+table without a convention is an error in `urdfkin.dh.rows`.
 """
 
 from __future__ import annotations
@@ -21,6 +16,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeGuard, TypeVar
 
@@ -38,17 +34,16 @@ from urdfkin.kinematics.rotation import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
-#: Largest difference between a printed rotation matrix (six digits) and the nearest exact rotation matrix. A
-#: matrix with a larger difference is not corrected.
+#: A printed rotation (six digits) is corrected if the nearest rotation differs by at most this number.
 _PRINTED = 1e-5
-#: The three rows of a pose must be within this number of lines after the heading of the pose. Some of these
-#: lines may be blank or Markdown fences.
+#: The three rows of a pose must be within this number of lines after the heading of the pose.
+#: Some of these lines may be blank or Markdown fences.
 _POSE_LINES = 6
-#: A setting on a separate line, such as `convention: modified`, with or without a comment mark.
+#: A setting is a line such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
-#: In a CSV file each line `# key: value` is a setting. `table_from_mapping` rejects an unknown key.
+#: In a CSV file each line `# key: value` is a setting; `table_from_mapping` rejects an unknown key.
 _KEY = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
-#: Names of columns that urdfkin writes; these names have no synonyms.
+#: Columns without synonyms
 _OWN = ("leader", "multiplier", "lower", "upper", "velocity", "effort", "sense")
 _NAMES = {
     **dict.fromkeys(("a", "link length", "length"), "a"),
@@ -86,8 +81,7 @@ def from_sheet(text: str) -> dict[str, Any]:
     else:
         raise _no_header(lines)
     around = [spelled(line) for line in grid.around]
-    # The title contains the robot's name. A robot with the name "robot" would make the title look like the
-    # setting `robot`.
+    # A title line is no setting, even if the name of the robot is "robot".
     plain = [line for line in grid.around if not _TITLE.search(line)]
     data = _settings(plain, _KEY if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(around, grid.columns)):
@@ -118,12 +112,9 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """A table that was found in a text, and the lines of the text outside the table.
+    """A table that was found in a text, and all lines outside the table (`around`).
 
     Attributes:
-        columns: The columns, from the line of headings.
-        rows: The cells of each row.
-        around: All lines outside the table.
         commas: Whether a comma in a cell is a decimal comma.
         strict: Whether an unknown column is an error.
     """
@@ -145,7 +136,7 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
         if columns is None:
             continue
         rows, end = list[list[str]](), k + 1
-        for end, below in enumerate(lines[k + 1 :], k + 1):  # noqa: B007  `end` is used below
+        for end, below in enumerate(lines[k + 1 :], k + 1):  # noqa: B007  the code after the loop reads `end`
             if not below.strip() and rows:
                 break
             cells = split(below)
@@ -169,10 +160,7 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
 
 
 def _no_header(lines: list[str]) -> InputError:
-    """Return the error for a text without the four required headings.
-
-    The error quotes the line that contains the most required headings.
-    """
+    """Return the error for missing headings; it quotes the line with the most required headings."""
     said = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
     named = [[cell.strip() for cell in cells if cell.strip()] for cells in said]
     best = max(named, key=lambda cells: sum(_column(cell).name in ORDER for cell in cells), default=[])
@@ -213,7 +201,7 @@ def _latex(lines: list[str]) -> _Grid | None:
 def _bars(lines: list[str]) -> _Grid | None:
     """Parse columns that are separated by the character | or by vertical box-drawing characters."""
     plain = [re.sub("[\u2502\u2503\u2551]", "|", line) for line in lines]
-    plain = [re.sub(r"\\([\[\]()])", r"\1", line) for line in plain]  # Markdown's escapes: a \[m\]
+    plain = [re.sub(r"\\([\[\]()])", r"\1", line) for line in plain]  # Markdown escapes brackets: a \[m\].
 
     def split(line: str) -> list[str]:
         return [cell.strip().strip("`") for cell in line.strip().strip("|").split("|")] if "|" in line else []
@@ -228,7 +216,7 @@ def _separated(lines: list[str]) -> _Grid | None:
     """
     for mark in (";", "\t", ","):
         kept = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
-        if grid := _grid(kept, lambda line, mark=mark: _csv_cells(line, mark), mark):  # type: ignore[misc]
+        if grid := _grid(kept, partial(_csv_cells, mark=mark), mark):
             return grid
     return None
 
@@ -323,12 +311,12 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Replace the rotation in a printed pose with the nearest exact rotation if it differs only by rounding.
+    """Replace a printed rotation with the nearest exact rotation if it differs only by the printed digits.
 
     A number that is not finite raises InputError.
     """
     pose = np.array(rows)
-    if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix
+    if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
     off = polar_factor(pose[:3, :3]) - pose[:3, :3]
     if ROUNDED < np.abs(off).max() < _PRINTED:
@@ -349,14 +337,11 @@ def _named_coordinates(lines: list[str]) -> list[str]:
 
 
 def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
-    """Return a row as a mapping from column names to cells with units.
-
-    Empty cells are left out, except the four required cells.
-    """
+    """Return a row as a mapping from column names to cells with units; optional empty cells are left out."""
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
         if not column.name and grid.strict and column.heading not in _COUNTS:
-            row[column.heading] = cell  # an unknown heading, which may be misspelt, is rejected later
+            row[column.heading] = cell  # `table_from_mapping` rejects this heading.
         elif not column.name or (not cell and column.name not in ORDER):
             continue
         elif column.name in (*ORDER, "beta", "offset"):
@@ -370,10 +355,7 @@ def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
 
 
 def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
-    """Return a cell as text with a unit, which comes from the cell or else from the column's heading.
-
-    An invalid cell raises InputError.
-    """
+    """Return a cell as text with its own unit or its column's unit; raise InputError for an invalid cell."""
     text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", cell) if commas else cell
     try:
         found: Cell = cell_of(text)
@@ -495,7 +477,6 @@ def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:
 
 
 def table_of(data: Mapping[str, Any], where: str) -> DHTable:
-    """Make a table from a file's plain data; errors as for `read_table`."""
     return _with_place(table_from_mapping, data, where)
 
 
@@ -533,35 +514,25 @@ def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
 
 
 def _is_markup(path: Path) -> bool:
-    """Whether a .txt file is a URDF."""
     try:
         return read_text(path.expanduser()).lstrip().startswith("<")
     except SourceError:
         return False
 
 
-def _from_toml(text: str) -> dict[str, Any]:
-    return tomllib.loads(text, parse_float=Literal)
-
-
-def _from_json(text: str) -> Any:
-    return json.loads(text, parse_float=Literal)
-
-
 _PARSERS: dict[str, Callable[[str], Any]] = {
-    ".toml": _from_toml,
-    ".json": _from_json,
+    ".toml": partial(tomllib.loads, parse_float=Literal),
+    ".json": partial(json.loads, parse_float=Literal),
     **dict.fromkeys((".csv", ".tsv", ".md", ".tex", ".txt"), from_sheet),
 }
 
 
 def references() -> dict[str, Path]:
-    """Return the names of the reference tables in urdfkin, each with the path of its file."""
     return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
 
 
 def published(robot: str) -> list[str]:
-    """Return, for each published table of a robot, a line of text with the option `--like` and the table."""
+    """Return a line with the option `--like` for each published table of a robot."""
     lines = []
     for name, path in references().items():
         data = read_mapping(path)
@@ -574,9 +545,7 @@ def published(robot: str) -> list[str]:
 def reference_path(name: str) -> Path:
     """Return the file of a table, given its path or the name of a reference table.
 
-    Raises:
-        UnknownNameError: there is no such file and no such reference table; the message lists the nearest
-            names.
+    If there is no such file and no such table, UnknownNameError lists the nearest names.
     """
     path = Path(name)
     if path.suffix or exists(path):

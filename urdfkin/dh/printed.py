@@ -28,11 +28,9 @@ class PrintedPrecision:
 
     Attributes:
         digits: Number of printed significant digits.
-        metres: Largest distance (metres), in sampled configurations, between the tip of the printed table and
-            the tip of the exact table.
+        metres: Largest distance, on samples, between the tips of the printed table and of the exact table.
         bound: Guaranteed bound (metres) of this distance at all joint values within the limits; None if there
             is no bound.
-        samples: Number of samples.
     """
 
     digits: int
@@ -41,29 +39,24 @@ class PrintedPrecision:
     samples: int
 
     def __str__(self) -> str:
-        proven = "" if self.bound is None else f", and proven within {at_most(self.bound)} m"
+        proven = "" if self.bound is None else f"; the proven bound is {at_most(self.bound)} m"
         return (
             f"printed with {self.digits} digits, the table gives the tip within {at_most(self.metres)} m"
-            " of its"
-            f" exact position on {self.samples} samples{proven}"
+            f" of its exact position on {self.samples} samples{proven}"
         )
 
 
 def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
     """Parse the printed form of a table, and compare the printed table with the exact table.
 
-    Args:
-        table: The table.
-        units: Format of the printed table.
-        pose_digits: Significant digits of base and tool. None: as many digits as in `units`.
+    `pose_digits` are the significant digits of base and tool; None: as many digits as in `units`.
     """
     digits = pose_digits or units.digits
     rows = tuple(_row(row, units) for row in table.rows)
     base, tool = (_pose(T, digits) for T in (table.base, table.tool))
     bounds = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
     q = values_within([bounds.get(name, UNKNOWN) for name in table.joint_names], SAMPLES)
-    # A DHTable accepts only exact rotations in base and tool. Therefore, the table here has no base and tool,
-    # and the code multiplies by the rounded base and tool.
+    # A DHTable accepts only exact rotations, so the rounded base and tool are multiplied separately.
     between = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)
@@ -72,10 +65,9 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
 
 
 def _row(row: DHRow, units: Units) -> DHRow:
-    """Return the row as it is printed."""
     a, alpha, d, theta, beta = row.cells
     rule = row.mimic
-    own = row.sense * rule.offset if rule else 0.0  # the printed constant includes this offset
+    own = row.sense * rule.offset if rule else 0.0  # The printed constant includes this offset.
     constant = constant_of(row)
     theta, d = (
         (_angle(constant, units) - own, _length(d, units))
@@ -84,15 +76,8 @@ def _row(row: DHRow, units: Units) -> DHRow:
     )
     if rule is not None:
         rule = replace(rule, multiplier=float(f"{rule.multiplier:.10g}"))
-    return replace(
-        row,
-        a=_length(a, units),
-        alpha=_angle(alpha, units),
-        d=d,
-        theta=theta,
-        beta=_angle(beta, units),
-        mimic=rule,
-    )
+    a, alpha, beta = _length(a, units), _angle(alpha, units), _angle(beta, units)
+    return replace(row, a=a, alpha=alpha, d=d, theta=theta, beta=beta, mimic=rule)
 
 
 def _angle(radians: float, units: Units) -> float:
@@ -134,13 +119,7 @@ def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: Floa
 
 
 def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
-    """Return the error of the printed parameters of a whole robot, at the link with the largest error.
-
-    Args:
-        table: The parameters.
-        units: Format of the printed parameters.
-        q: (n, coordinates) configurations.
-    """
+    """Return the error of a robot's printed parameters at `q` (n, coordinates), at the worst link."""
     again = replace(table, rows=tuple(_tree_row(row, units) for row in table.rows))
     off = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
     return PrintedPrecision(units.digits, float(off.max(initial=0.0)), None, len(q))

@@ -25,7 +25,7 @@ uncertain by 0.5 mm.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
@@ -45,7 +45,6 @@ class Literal(float):
     text: str
 
     def __new__(cls, text: str) -> Literal:
-        """Parse the number, and store its text."""
         number = super().__new__(cls, text)
         number.text = text
         return number
@@ -54,8 +53,7 @@ class Literal(float):
 def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
     """Return, for each row, half a unit of the last digit of each cell, in metres and radians.
 
-    Args:
-        data: A valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
+    `data` is a valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
     """
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     return tuple(_of_row(row, units) for row in data["rows"])
@@ -77,9 +75,8 @@ def _of_row(row: Mapping[str, Any] | Sequence[Any], units: Units) -> dict[str, f
 def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     """Return half a unit of a written number's last digit; 0 if the number is exact.
 
-    Example:
-        >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
-        (5e-05, 0.0, 0.5, 0.0)
+    >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
+    (5e-05, 0.0, 0.5, 0.0)
     """
     text = value.text if isinstance(value, Literal) else str(value)
     text = (cell_of(value).text or "0") if isinstance(value, str) else text
@@ -93,8 +90,7 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     return 0.5 * 10.0 ** min(exponent, 0)
 
 
-#: Order of the cells in a row that is a list. The list may also have "R" or "P" at the end.
-#: A row with beta must be a mapping.
+#: A row that is a list has its cells in this order, and may end with "R" or "P".
 ORDER = ("a", "alpha", "d", "theta")
 _KINDS = {
     "r": JointKind.REVOLUTE,
@@ -108,22 +104,16 @@ _BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order 
 
 
 def written_row(row: Any, index: int, units: Units) -> DHRow:
-    """Parse a handwritten row.
+    """Parse a handwritten row: a `DHRow`, a mapping of its fields, or a list in the order of `ORDER`.
 
-    Args:
-        row: A `DHRow`, a mapping of its fields, or a list in the order of `ORDER`.
-        index: Index of the row, from 0.
-        units: Units of its numbers.
-
-    Raises:
-        InputError: the row has another type or an invalid cell; the message names the row and the column.
+    `index` counts from 0. InputError names the row and the column.
     """
     if isinstance(row, DHRow):
         return row
     row = row.tolist() if isinstance(row, np.ndarray) else row
     where = f"row {index + 1}"
     fields = row if isinstance(row, Mapping) else _of_list(row, where)
-    _check_keys(fields, _KEYS, "a row", where)
+    check_keys(fields, _KEYS, "a row", where)
     fields = _split_variable(fields, index, where)
     cells = {name: _cell(name, fields.get(name, 0.0), units, where) for name in (*ORDER, "beta")}
     return DHRow(
@@ -137,20 +127,17 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
 
 
 def refuse_other_order(rows: Sequence[Any]) -> None:
-    """Reject rows, given as lists, that seem to be in the Robotics Toolbox's order theta, d, a, alpha.
+    """Raise InputError for lists that seem to have the Robotics Toolbox's order theta, d, a, alpha.
 
     Angles of a table are nearly always multiples of 15 degrees. Lengths hardly ever look like such angles. In
     the Robotics Toolbox's order, the first and the fourth column contain angles, and the second column
     contains lengths. Rows are rejected if the first and the fourth column look like angles, and the second
     column looks like lengths.
-
-    Raises:
-        InputError: the columns seem to be in the other order; the message names the two orders.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
         return
-    first, second, _, fourth = ([row[k] for row in lists if not _is_zero(row[k])] for k in range(4))
+    first, second, _, fourth = ([row[k] for row in lists if row[k] != 0] for k in range(4))
     if second and fourth and not any(map(_looks_round, second)) and all(map(_looks_round, [*first, *fourth])):
         raise InputError(
             "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a list must have"
@@ -170,10 +157,6 @@ def name_of(value: Any, where: str) -> str:
 
 def _has_order(row: Sequence[Any]) -> bool:
     return len(row) == len(ORDER) or (len(row) == len(ORDER) + 1 and isinstance(row[-1], str))
-
-
-def _is_zero(value: Any) -> bool:
-    return not isinstance(value, str) and value == 0
 
 
 def _looks_round(value: Any) -> bool:
@@ -206,7 +189,7 @@ def _of_list(row: Any, where: str) -> dict[str, Any]:
     return dict(zip((*ORDER, "kind"), row, strict=False))
 
 
-def _check_keys(given: Mapping[str, Any], keys: Sequence[str], what: str, where: str) -> None:
+def check_keys(given: Iterable[str], keys: Sequence[str], what: str, where: str | None = None) -> None:
     for key in given:
         if key not in keys:
             raise InputError(
@@ -326,7 +309,7 @@ def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> M
         raise InputError(
             "`mimic` must have the form {leader, multiplier, offset}", where=where, found=repr(value)
         )
-    _check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
+    check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
     return Mimic(
         name_of(value["leader"], f"{where}, leader"),
         read_number(value.get("multiplier", 1.0), f"{where}, multiplier"),
@@ -341,7 +324,7 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
         raise InputError(
             "`limit` must have the form {lower, upper, velocity, effort}", where=where, found=repr(value)
         )
-    _check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
+    check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
     lower, upper, velocity = (
         _own(name, value[name], fields, units, where) if name in value else default
         for name, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))
@@ -360,8 +343,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys that do not change the table.
-#: These keys contain information, for example the source of the numbers and the URDF of the same robot.
+#: These keys, for example the source of the numbers, do not change the table.
 NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 
@@ -432,8 +414,7 @@ def table_from_rows(
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
     """Make a table from a mapping in the form that the module's docstring shows.
 
-    Raises:
-        InputError: the mapping has no convention or an unknown key, or `table_from_rows` raises an error.
+    InputError is raised without a convention, for an unknown key, and as in `table_from_rows`.
     """
     if "convention" not in data:
         raise InputError(
@@ -441,13 +422,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
             remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
             question=Question.WHICH_DH_CONVENTION,
         )
-    for key in data:
-        if key not in _TABLE_KEYS and key not in NOTES:
-            raise InputError(
-                "unknown key in a table",
-                found=repr(key),
-                remedy=f"the known keys are {', '.join(_TABLE_KEYS)}",
-            )
+    check_keys([key for key in data if key not in NOTES], _TABLE_KEYS, "a table")
     options = {key: data[key] for key in _TABLE_KEYS if key in data and key not in ("convention", "rows")}
     return table_from_rows(data.get("rows"), data["convention"], **options)
 

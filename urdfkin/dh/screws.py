@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.dh.convert import UNBOUNDED_SLIDE
+from urdfkin.dh.rows import check_keys
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line
@@ -42,15 +43,12 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws. The length of an axis may differ from 1 by at most this number. The pitch
-#: (m/rad) of a revolute joint's screw may differ from 0 by at most this number.
+#: The length of a handwritten axis may differ by this number from 1, and its pitch (m/rad) from 0.
 _WRITTEN = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
 class ScrewJoint:
-    """One joint: its name, kind, mimic rule and limits."""
-
     name: str
     kind: JointKind
     mimic: Mimic | None = None
@@ -290,15 +288,10 @@ def screws_from(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
-    Args:
-        screws: (n, 6) one row (w, v) for each joint, with the angular part first. An array (6, n) with one
-            column for each joint, as in Modern Robotics, is also accepted if n is not six.
-        M: (4, 4) or (3, 4) pose of the tip in the zero configuration (metres).
-        frame: Frame of the screws: "space" is the base frame, and "body" is the tip frame.
-        joints: The joints' names; joint_1, joint_2, ... by default.
-        robot: The robot's name.
-        base_frame: Name of the base frame.
-        tip_frame: Name of the tip frame.
+    `screws` (n, 6) has a row (w, v) for each joint, with the angular part first. An array (6, n) with a
+    column for each joint, as in Modern Robotics, is also accepted if n is not six. `M`, (4, 4) or (3, 4), is
+    the pose of the tip in the zero configuration (metres). The screws are in the base frame (`frame` is
+    "space") or in the tip frame ("body"). By default, the joints are called joint_1, joint_2, ...
 
     Raises:
         InputError: an array has a wrong shape, the length of an axis is not 1, or a screw has a pitch (w . v
@@ -330,7 +323,7 @@ def screws_from(
         size = float(np.linalg.norm(S[i, :3] if turns else S[i, 3:]))
         if abs(size - 1.0) > _WRITTEN:
             raise InputError(
-                "the axis w of a screw must have length 1",
+                f"the axis {'w' if turns else 'v'} of a screw must have length 1",
                 where=f"screw {i + 1}",
                 found=f"{size:.6g}",
                 remedy="write a screw as (w, v), angular part first",
@@ -348,19 +341,12 @@ def screws_from(
 
 
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
-    """Make screws from a file's plain data, with the keys M and space or body; errors as for `screws_from`.
+    """Make screws from a file's plain data, with the keys M and space or body.
 
-    Raises:
-        InputError: the data has an unknown key, or has neither the key space nor the key body.
+    The errors are those of `screws_from`, and InputError for an unknown key or without space and body.
     """
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
-    for key in data:
-        if key not in known:
-            raise InputError(
-                "unknown key in the table of screws",
-                found=repr(key),
-                remedy=f"the known keys are {', '.join(known)}",
-            )
+    check_keys(data, known, "the table of screws")
     frame = next((one for one in ("space", "body") if one in data), None)
     if frame is None:
         raise InputError(

@@ -10,11 +10,6 @@ snapped, from base to tip:
 The positions of joint origins are not changed. Therefore, each change of an angle only rotates the rest of
 the chain about a joint's origin. From these rotations, `urdfkin.dh.table` derives a bound of the effect on
 the tip.
-
-`snap_hint` finds cells that look like angles rounded by the file (1.5708, 3.14159265359). For example, such
-an angle may cause a tilt of 5e-12 rad. This tilt is larger than rounding errors of the computation
-(`urdfkin.dh.common_normals`). The table therefore contains the tilt, and offsets of about 1e-12 m that the
-tilt causes. The hint says that the file caused the tilt and the offsets.
 """
 
 from __future__ import annotations
@@ -34,10 +29,10 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: Largest tolerance (rad): 5 degrees.
+#: The largest tolerance is 5 degrees (in rad).
 #: With more than 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
-#: Number of configurations at which a snapped table is compared with the exact chain.
+#: A snapped table is compared with the exact chain at this number of configurations.
 SAMPLES = 500
 
 
@@ -76,10 +71,7 @@ def snap_chain(
 
 
 def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DHTable, list[SnapChange]]:
-    """Snap theta of each row of a derived table.
-
-    A change of theta turns the rest of the chain about the row's axis.
-    """
+    """Snap theta of each row; a change of theta turns the rest of the chain about the row's axis."""
     rows, changes = list(table.rows), list[SnapChange]()
     for i, row in enumerate(rows):
         theta = wrapped(nearest_twelfth(row.theta)) + 0.0
@@ -137,8 +129,7 @@ def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
 def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree, dict[str, float]]:
     """Snap roll, pitch and yaw of all joint origins.
 
-    The function returns the tree with the changed joint origins. For each changed joint it also returns the
-    angle (rad) by which the origin rotated.
+    The second result is the angle (rad) by which the origin of each changed joint rotated.
     """
     joints, moved = list(tree.joints), dict[str, float]()
     for i, joint in enumerate(joints):
@@ -156,7 +147,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    if level <= tolerance:  # roll and yaw are about the same axis: use only yaw
+    if level <= tolerance:  # Roll and yaw are about the same axis.
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
@@ -192,7 +183,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
         is_round = abs(angle - twelfth) <= max(tolerance, TURN * EPS)
         turn = coordinate_rotation(axis, np.asarray(twelfth if is_round else angle))
         if is_round:
-            turn[np.abs(turn) < EPS] = 0.0  # the computed cosine of a right angle is not exactly 0
+            turn[np.abs(turn) < EPS] = 0.0  # The computed cosine of a right angle is not 0.
         R = R @ turn
     return R
 
@@ -203,10 +194,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
 def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], moved: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
-    """Return a change for each snapped origin on the path.
-
-    The attribute `lever` of a change is the path length from the origin to the tip.
-    """
+    """Return a change for each snapped origin; `lever` is the path length from it to the tip."""
     changes, lever, sliders = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):
@@ -227,9 +215,8 @@ def _changes_of_origins(
 def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
     """Return a change that rotates the rest of the chain about the origin of joint k.
 
-    The attribute `lever` of the change is the largest possible distance from this origin to the tip.
-
-    Joints are counted from 1; n + 1 is the tip.
+    Joints are counted from 1; n + 1 is the tip. The attribute `lever` of the change is the largest possible
+    distance from this origin to the tip.
     """
     sliders = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), sliders)
@@ -245,7 +232,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
     return k - 1 if table.convention is Convention.STANDARD else k
 
 
-#: If a mimicked joint is not on the path, its coordinate is assumed to be in this range (rad or metres).
+#: A mimicked joint that is not on the path is assumed to be in this range (rad or metres).
 UNKNOWN = (-1.0, 1.0)
 
 
@@ -254,18 +241,18 @@ def travel(limit: Limit | None) -> float:
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
-#: A cell nearly equals a round value if it differs from this value by at most this number. For an angle, the
-#: round values are the multiples of 15 degrees, and the difference is in radians. For a length, the only
-#: round value is 0, and the length is divided by the table's span.
+#: `noisy_cells` finds angles that differ by at most this number (rad) from a multiple of 15 degrees.
+#: It finds lengths of at most this number times the table's span.
 LARGEST = 1e-4
-#: Tolerances (rad) that `snap_hint` tries, in ascending order.
+#: `snap_hint` tries these tolerances (rad) in ascending order.
 TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
     """Return (joint, cell, difference in rad or m) for each cell that nearly equals a round value.
 
-    The cell with the smallest difference is first.
+    The round values are the multiples of 15 degrees for angles, and 0 for lengths. The cell with the smallest
+    difference is first.
     """
     found = []
     for row in table.rows:
@@ -280,19 +267,14 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Return a hint about cells that nearly equal a multiple of 15 degrees or zero.
+    """Return a hint about cells that nearly equal a multiple of 15 degrees or zero, in one line of text.
 
-    The hint names one of these cells. It also recommends a tolerance from `TOLERANCES`: the tolerance after
-    which the fewest cells nearly equal a round value.
-
-    Args:
-        table: An exact table.
-        snapped: Function that takes a tolerance (rad), and returns the same table with angles rounded to
-            multiples of 15 degrees.
-
-    Returns:
-        One line of text. None if no cell nearly equals a round value, or if no tolerance reduces the number
-        of these cells.
+    For example, an angle that the file rounds (1.5708) may cause a tilt of 5e-12 rad and offsets of about
+    1e-12 m. They are larger than rounding errors of the computation, so the table contains them. The hint
+    names one of these cells. It also recommends a tolerance from `TOLERANCES`: the tolerance after which the
+    fewest cells nearly equal a round value. The result is None if no cell nearly equals a round value, or if
+    no tolerance reduces the number of these cells. `snapped` takes a tolerance (rad), and returns the exact
+    `table` with angles rounded to multiples of 15 degrees.
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:

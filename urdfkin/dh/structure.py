@@ -1,11 +1,10 @@
 """Find the structure of an arm and export it for closed-form inverse kinematics solvers.
 
-`structure` reports which axes are parallel or intersect, each with the deviation from the exact property. The
-function also reports which closed-form solutions exist. The distance and the angle of two consecutive axes
-are the same in every configuration. Therefore, the distance and the angle are computed only in the zero
-configuration, from the screws (`urdfkin.dh.screws`). Pinocchio checks the screws. Pieper (1968): six revolute
-joints have a closed-form solution if three consecutive axes are parallel or intersect in one point. A
-calibrated robot has such a property only approximately. The deviation is given in radians and metres.
+The distance and the angle of two consecutive axes are the same in every configuration. Therefore,
+`structure` computes them only in the zero configuration, from the screws (`urdfkin.dh.screws`). Pinocchio
+checks the screws. Pieper (1968): six revolute joints have a closed-form solution if three consecutive axes
+are parallel or intersect in one point. A calibrated robot has such a property only approximately. The
+deviation is given in radians and metres.
 
 `opw_of` returns the seven parameters of an ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et
 al., 2014). An OPW arm is the standard table
@@ -15,9 +14,8 @@ al., 2014). An OPW arm is the standard table
 with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF (`urdfkin.dh.make`). The
 frames, the zero positions and the positive directions of the joints are the same as in the OPW table. The OPW
 parameters are read from the derived table. OPW has no parameter for the small tilts of a calibrated arm, so
-`opw_of` ignores these tilts. `Opw.placement` computes the solver's forward kinematics with the OPW
-parameters. The error of the OPW parameters is the difference between this pose and the pose that urdfkin
-computes for the arm.
+`opw_of` ignores these tilts. The error of the OPW parameters is the difference between the pose by
+`Opw.placement` and the pose that urdfkin computes for the arm.
 
 `axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
@@ -32,7 +30,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -48,13 +46,13 @@ from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind
 
-#: Largest deviations (rad, metres) of a property that is reported, for example parallel axes. The property is
-#: reported as exact if its deviations are at most `EXACT` (rad and metres).
+#: `NEAR_ANGLE` (rad) and `NEAR_LENGTH` (metres) limit the deviations of a reported property.
+#: The property is exact if its deviations are at most `EXACT` (rad and metres).
 NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
-#: Singular values of the Jacobian below this limit are treated as zero. Rounding errors are far smaller, and
-#: the distances of real axes are far larger.
+#: Singular values of the Jacobian below this limit are treated as zero.
+#: Rounding errors are far smaller, and the distances of real axes are far larger.
 _RANK = 1e-6
-#: Number of random configurations within the limits for the estimate of the reach; mimic rules are ignored.
+#: The reach is estimated at this number of random configurations within the limits, without mimic rules.
 _SAMPLES = 2000
 
 
@@ -73,13 +71,11 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A geometric property of some consecutive joints, for example three parallel axes.
+    """A geometric property of some consecutive joints, for example "spherical wrist".
 
     Attributes:
-        name: "parallel", "meet in a point", "spherical wrist", ...
-        joints: Names of the joints.
-        radians: Angle (rad) between the actual axes and axes with the exact property.
-        metres: Distance (metres) between the actual axes and axes with the exact property.
+        radians: Angle between the actual axes and axes with the exact property.
+        metres: Distance between the actual axes and axes with the exact property.
         at: (3,) position of the intersection in the base at the zero configuration (metres), or None.
     """
 
@@ -91,7 +87,6 @@ class Kind:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the deviation is at most 1e-9 rad and 1e-9 m."""
         return self.radians <= EXACT and self.metres <= EXACT
 
 
@@ -100,14 +95,9 @@ class Structure:
     """The geometric structure of a path.
 
     Attributes:
-        robot: The robot's name.
-        base_frame: Name of the base frame.
-        tip_frame: Name of the tip frame.
         joints: R or P for each joint.
         freedoms: Degrees of freedom of the tip: the Jacobian's rank at a random configuration.
-        pairs: Angle and distance of each pair of consecutive axes.
-        kinds: Exact and approximate properties of the path; the property with the smallest deviation is
-            first.
+        kinds: Exact and approximate properties; the property with the smallest deviation is first.
         reach: Upper bound of the tip's distance (metres) from a point of the first axis. The point is the one
             nearest to the second axis.
         reached: Largest distance of the tip from this point in sampled configurations (metres).
@@ -125,17 +115,8 @@ class Structure:
     reached: float
     solvers: tuple[str, ...]
 
-    def as_mapping(self) -> dict[str, Any]:
-        """Return the fields as plain data, in metres and radians."""
-        return asdict(self)
-
 
 def structure(screws: ProductOfExponentials) -> Structure:
-    """Return the structure of a path.
-
-    Args:
-        screws: The path as a product of exponentials.
-    """
     letters = "".join("R" if joint.kind.turns else "P" for joint in screws.joints)
     pairs = tuple(_pair(screws, i) for i in range(len(letters) - 1))
     kinds = [*_triples(screws, letters, pairs), *_arm_kinds(screws, letters, pairs)]
@@ -181,10 +162,7 @@ def _pair(screws: ProductOfExponentials, i: int) -> Pair:
 
 
 def meeting(screws: ProductOfExponentials, at: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the point nearest to the given axes, and its largest distance from these axes (metres).
-
-    The point minimizes the sum of the squared distances.
-    """
+    """Return the point nearest to some axes in least squares, and its largest distance from them (m)."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in at:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -307,8 +285,8 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
 
 
-#: `TOLERANCE` is the default tolerance of `opw_of` (metres and rad). `SAMPLES` is the number of
-#: configurations at which `opw_of` computes the tip error.
+#: `TOLERANCE` is the default tolerance of `opw_of` (metres and rad).
+#: `opw_of` computes the tip error at `SAMPLES` configurations.
 TOLERANCE, SAMPLES = 1e-6, 200
 _H = math.pi / 2.0
 _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
@@ -321,7 +299,6 @@ class Opw:
     The solver's joint values are q_opw = sign * q - offset, where q are the URDF's joint values.
 
     Attributes:
-        joints: Joint names, base to tip.
         lengths: a1, a2, b, c1, c2, c3, c4 in metres.
         offsets: Constant `offset` of each joint (rad).
         signs: Factor `sign` of each joint, +1 or -1.
@@ -370,9 +347,7 @@ class Opw:
 def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     """Return the OPW parameters of a path of six revolute joints.
 
-    Args:
-        path: The path, base to tip.
-        tolerance: Largest error of the tip on `SAMPLES` configurations, in metres and in radians.
+    `tolerance` is the largest error of the tip on `SAMPLES` configurations, in metres and in radians.
 
     Raises:
         InputError: the path does not have exactly six revolute joints, or is not an OPW arm. The message
@@ -426,11 +401,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _read(table: DHTable) -> Opw:
-    """Return the OPW parameters of an arm.
-
-    The frames of `table` must be the frames of the OPW table. The function ignores cells without a
-    corresponding OPW parameter.
-    """
+    """Return the OPW parameters of a table with the frames of the OPW table; other cells are ignored."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -444,10 +415,7 @@ def _read(table: DHTable) -> Opw:
 def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) between points on these axes, in metres.
 
-    The first vector begins at the base, and the last vector ends at the tip.
-
-    Args:
-        screws: A path of revolute joints.
+    All joints must be revolute. The first vector begins at the base, and the last vector ends at the tip.
     """
     way = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(way, axis=0)

@@ -15,12 +15,10 @@ The variable of row i is theta_i for a revolute joint and d_i for a prismatic jo
 is the constant in the row plus `sense` times the joint's value. The standard convention is the textbook's:
 z_{i-1} is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
-Snapping replaces angles by multiples of 15 degrees. `SnapReport` states the effect of snapping on the tip: a
-guaranteed bound, and the largest effect in sampled configurations. A rotation by a small angle about a
-joint's origin moves the tip by at most that angle times the tip's distance from the origin. This distance is
-at most the path
+Snapping replaces angles by multiples of 15 degrees. A rotation by a small angle about a joint's origin moves
+the tip by at most that angle times the tip's distance from the origin. This distance is at most the path
 length: the sum of the constant offsets from that origin to the tip, plus the travel of the prismatic joints.
-The sum of the bounds of all changes is valid for every configuration.
+The sum of the bounds of all changes is valid for every configuration (`SnapReport`).
 """
 
 from __future__ import annotations
@@ -167,13 +165,12 @@ class DHRow:
         return along_axis(self.theta, self.d)
 
 
-#: Largest difference between a handwritten angle and the multiple of 15 degrees that it looks like. The
-#: difference is divided by 15 degrees.
+#: A handwritten angle may differ by this fraction of 15 degrees from a multiple of 15 degrees.
 _WRITTEN = 1e-3
 
 
 def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
-    """Return the transforms S = Rz(theta) Tz(d) (..., 4, 4), radians and metres; the arguments broadcast."""
+    """Return S = Rz(theta) Tz(d) (..., 4, 4), radians and metres; the arguments broadcast."""
     theta, d = np.broadcast_arrays(np.asarray(theta, np.float64), np.asarray(d, np.float64))
     S = np.zeros((*theta.shape, 4, 4))
     S[..., 0, 0] = S[..., 1, 1] = np.cos(theta)
@@ -200,9 +197,8 @@ def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
 def as_step(T: FloatArray) -> tuple[float, float] | None:
     """Return (a, alpha) if a pose equals Tx(a) Rx(alpha), up to rounding of the rotation; else None.
 
-    Example:
-        >>> as_step(between_axes(0.5, math.pi))
-        (0.5, 3.141592653589793)
+    >>> as_step(between_axes(0.5, math.pi))
+    (0.5, 3.141592653589793)
     """
     tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # tilt of the x axis
     if tilt > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
@@ -215,9 +211,8 @@ def as_step(T: FloatArray) -> tuple[float, float] | None:
 def wrapped(angle: float) -> float:
     """Return the equivalent angle in (-pi, pi]; an angle within rounding of -pi becomes pi.
 
-    Example:
-        >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
-        (True, True)
+    >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
+    (True, True)
     """
     turned = math.remainder(angle, 2.0 * math.pi)
     return math.pi if turned <= -math.pi * (1.0 - EPS) else turned
@@ -306,7 +301,7 @@ class SnapReport:
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
 
 
-#: Tolerance for the rotation matrix in a handwritten pose, which often has only seven digits.
+#: A rotation in a handwritten pose may have this error, because it often has only seven digits.
 _TYPED = 1e-6
 
 

@@ -13,8 +13,6 @@ d(i). The number sigma is the joint's kind: 0 revolute (theta), 1 prismatic (r),
 joint contains all six numbers, so the frame of each fixed link is exact too. The angle beta is not part of
 the original notation. The angle beta is zero except between nearly parallel axes (Hayati). Without beta,
 nearly parallel axes would need offsets of kilometres.
-
-`document`, `as_csv` and `as_mapping` return the table as a document, as CSV and as plain data.
 """
 
 from __future__ import annotations
@@ -56,8 +54,6 @@ class TreeRow:
     """One joint and its child link, in metres and radians.
 
     Attributes:
-        joint: Name of the joint.
-        link: Name of the child link.
         antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
         gamma: Rotation about the antecedent's z.
@@ -69,7 +65,6 @@ class TreeRow:
         r: Offset along the joint's own z; the joint's value is added if sigma is 1.
         leader: Name of the mimicked joint; the joint's own name if it mimics no other joint.
         multiplier: Factor of the mimic rule: the joint's value is multiplier * q_leader + offset.
-        offset: Offset of the mimic rule.
     """
 
     joint: str
@@ -90,19 +85,15 @@ class TreeRow:
 
 @dataclass(frozen=True)
 class TreeParameters:
-    """The table of a whole robot.
+    """The table of a whole robot, with a row for each joint, including fixed joints.
 
     Attributes:
-        robot: The robot's name.
-        root: The root link.
-        rows: One row for each joint, including fixed joints, in the tree's order.
         ways: (joints,) path length (metres) from the root to each joint, which is the sum of the URDF's
             offsets.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row. The frame of
             a row has z along the joint's axis and x along the common normal.
-        left_out: Tilts that are not larger than rounding errors are replaced by zero
-            (`urdfkin.dh.common_normals`). For each path from the root, these tilts are added. This attribute
-            is the largest sum (rad).
+        left_out: Largest sum (rad), over the paths from the root, of the tilts that are replaced by zero
+            because they are not larger than rounding errors (`urdfkin.dh.common_normals`).
     """
 
     robot: str
@@ -121,8 +112,8 @@ class TreeParameters:
     def roundings(self) -> float:
         """Estimated rounding error of the poses on the longest path, in eps * reach.
 
-        All errors measured so far are smaller than this estimate. It is not a proven bound. It does not
-        include Pinocchio's rounding errors.
+        All errors measured so far are smaller than this estimate. The estimate is not a proven bound, and
+        does not include Pinocchio's rounding errors.
         """
         deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + deepest) + self.left_out / EPS
@@ -133,10 +124,9 @@ class TreeParameters:
         The result is the larger of the path lengths in the URDF and in the table.
         """
         values = np.abs(self._values(q))
-        own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
-        own = own + np.where([row.sigma == 1 for row in self.rows], values, 0.0)
-        own = own + np.linalg.norm(self.T_frame_link[:, :3, 3], axis=-1)
         slides = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
+        own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
+        own = own + slides + np.linalg.norm(self.T_frame_link[:, :3, 3], axis=-1)
         reach = np.zeros((*q.shape[:-1], len(self.rows)))
         for j in range(len(self.rows)):
             way = self._way(j)
@@ -164,11 +154,8 @@ class TreeParameters:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the poses (..., joints, 4, 4) of the URDF frames of all links in the root frame.
 
-        Args:
-            q: (..., coordinates) in the order of `coordinates`.
-
-        Raises:
-            InputError: the wrong number of coordinates.
+        `q` (..., coordinates) has the order of `coordinates`; another number of coordinates raises
+        InputError.
         """
         q = np.asarray(q, dtype=np.float64)
         if q.shape[-1:] != (len(self.coordinates),):
@@ -187,9 +174,6 @@ class TreeParameters:
 
 def tree_parameters(tree: KinematicTree) -> TreeParameters:
     """Return Khalil and Kleinfinger's parameters of a whole robot, exact to rounding.
-
-    Args:
-        tree: The robot.
 
     Raises:
         InputError: the robot has a planar or floating joint, which has no single axis.
@@ -224,12 +208,11 @@ class _Link:
 
     Attributes:
         antecedent: Index of the nearest moving link towards the root; -1 is the root.
-        T_antecedent_axis: (4, 4) pose of this axis frame in the axis frame of the antecedent, the nearest
-            moving link towards the root.
+        T_antecedent_axis: (4, 4) pose of this axis frame in the axis frame of the antecedent.
         T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
         noise: Noise of `T_antecedent_axis`.
-        left_out: Tilts that are not larger than rounding errors are replaced by zero. This attribute is the
-            sum (rad) of the replaced tilts between the root and this link.
+        left_out: Sum (rad) of the tilts between the root and this link that are replaced by zero, because
+            they are not larger than rounding errors.
     """
 
     antecedent: int
@@ -242,9 +225,10 @@ class _Link:
 def _links(tree: KinematicTree) -> list[_Link]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_Link]()
-    # The list has a tuple for each link. The first entry is the index of the nearest moving link towards the
-    # root, or -1 for the root. The second entry is the pose of the link in the axis frame of this moving
-    # link. The third entry is the number of joints between the two links.
+    # Each link has a tuple of three entries.
+    # The first entry is the index of the nearest moving link towards the root, or -1 for the root.
+    # The second entry is the pose of the link in the axis frame of this moving link.
+    # The third entry is the number of joints between the two links.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, way) in enumerate(zip(tree.joints, _path_lengths(tree), strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -262,10 +246,9 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
     The transform leads from the axis of the antecedent (the nearest moving link towards the root) to the
-    joint's axis. The angle and the offset lead from the axis frame of a link to the frame of its row.
-
-    The first moving child of a link defines the link's x axis. For a link without a moving child, x is chosen
-    so that theta = 0.
+    joint's axis. The angle and the offset lead from the axis frame of a link to the frame of its row. The
+    first moving child of a link defines the link's x axis. For a link without a moving child, x is chosen so
+    that theta = 0.
     """
     ways = _path_lengths(tree)
     steps, own = list[Step](), {-1: (0.0, 0.0)}
@@ -336,17 +319,13 @@ def as_mapping(table: TreeParameters) -> dict[str, Any]:
 
 
 def document(table: TreeParameters, units: Units) -> TextDocument:
-    """Return the table with its title and its formula."""
     rows = [_cells(table, j, units) for j in range(len(table.rows))]
     title = f"{table.robot}: Khalil-Kleinfinger parameters, {table.root} is frame 0"
     return TextDocument(title, [Code(FORMULA), "", Table(_headings(table, units), rows, (1,), names=(1,))])
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return CSV, in metres and radians.
-
-    Each line contains the numbers of a row, and T11 to T34 of T_frame_link.
-    """
+    """Return CSV in metres and radians; each line contains a row, and T11 to T34 of T_frame_link."""
     places = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *places]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3].tolist(), strict=True):

@@ -23,15 +23,11 @@ from urdfkin.errors.validators import safe_repr
 
 
 class Angles(StrEnum):
-    """Unit of angles in text."""
-
     RADIANS = "radians"
     DEGREES = "degrees"
 
 
 class Lengths(StrEnum):
-    """Unit of lengths in text."""
-
     METRES = "metres"
     MILLIMETRES = "millimetres"
 
@@ -43,13 +39,9 @@ COLUMNS = ("a", "alpha", "d", "theta")
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Format of the numbers in a printed table; radians and metres by default.
+    """Format of the numbers in a printed table, with `digits` significant digits.
 
-    Attributes:
-        angles: Radians or degrees. In radians, exact multiples of pi/12 are written as fractions of pi.
-        lengths: Metres or millimetres.
-        digits: Significant digits.
-        columns: Order of the columns in printed tables.
+    Exact multiples of pi/12 in radians are written as fractions of pi.
     """
 
     angles: Angles = Angles.RADIANS
@@ -59,29 +51,21 @@ class Units:
 
     @property
     def counts_millimetres(self) -> bool:
-        """Whether lengths are in millimetres."""
         return self.lengths is Lengths.MILLIMETRES
 
     @property
     def angle_name(self) -> str:
-        """Name of the angle unit in a column's heading."""
         return "rad" if self.angles is Angles.RADIANS else "deg"
 
     @property
     def length_name(self) -> str:
-        """Name of the length unit in a column's heading."""
         return "m" if self.lengths is Lengths.METRES else "mm"
 
     def angle(self, radians: float, pi: str = "pi") -> str:
-        """Format an angle.
+        """Format an angle; `pi` is the text for pi.
 
-        Args:
-            radians: The angle.
-            pi: Text for pi.
-
-        Example:
-            >>> Units().angle(-math.pi / 2), Units(Angles.DEGREES).angle(math.pi / 12)
-            ('-pi/2', '15')
+        >>> Units().angle(-math.pi / 2), Units(Angles.DEGREES).angle(math.pi / 12)
+        ('-pi/2', '15')
         """
         fraction = pi_fraction(radians)
         if self.angles is Angles.DEGREES:
@@ -93,9 +77,8 @@ class Units:
     def length(self, metres: float) -> str:
         """Format a length.
 
-        Example:
-            >>> Units(lengths=Lengths.MILLIMETRES).length(0.0825)
-            '82.5'
+        >>> Units(lengths=Lengths.MILLIMETRES).length(0.0825)
+        '82.5'
         """
         return self._number(metres if self.lengths is Lengths.METRES else metres * 1000.0)
 
@@ -123,9 +106,8 @@ def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10)
 def pi_fraction(radians: float) -> Fraction | None:
     """Return an angle as a multiple of pi if it is exactly a multiple of pi/12; None for any other angle.
 
-    Example:
-        >>> pi_fraction(math.pi / 2), pi_fraction(1.5708)
-        (Fraction(1, 2), None)
+    >>> pi_fraction(math.pi / 2), pi_fraction(1.5708)
+    (Fraction(1, 2), None)
     """
     twelfths = round(radians * 12.0 / math.pi)
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
@@ -140,14 +122,10 @@ def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
 
 
 def read_number(value: object, where: str) -> float:
-    """Parse a number, a number in text, or a multiple of pi such as "-pi/2" or "3*pi/4".
+    """Parse a number, a number in text, or a multiple of pi such as "-pi/2"; raise InputError with `where`.
 
-    Raises:
-        InputError: the value is not such a number; the message contains `where`.
-
-    Example:
-        >>> read_number("-pi/2", "alpha") == -math.pi / 2
-        True
+    >>> read_number("-pi/2", "alpha") == -math.pi / 2
+    True
     """
     try:
         number = _number(value)
@@ -178,7 +156,7 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     return number if units.angles is Angles.RADIANS else in_radians(number)
 
 
-#: Characters that occur in web pages, PDFs and LaTeX, each with the equivalent plain text.
+#: These characters occur in web pages, PDFs and LaTeX; each has an equivalent plain text.
 _SAME = str.maketrans(
     {
         **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),
@@ -249,14 +227,10 @@ def spelled(text: str) -> str:
 
 
 def cell_of(written: str) -> Cell:
-    """Parse a cell.
+    """Parse a cell; raise NoCellError for an invalid cell.
 
-    Raises:
-        NoCellError: the cell is invalid; the message names the invalid part.
-
-    Example:
-        >>> cell_of("-q2 + 90°")
-        Cell(number=90.0, unit='deg', times=-1.0, variable=2, text='90')
+    >>> cell_of("-q2 + 90°")
+    Cell(number=90.0, unit='deg', times=-1.0, variable=2, text='90')
     """
     if len(written) > _LONGEST:
         raise NoCellError(f"a cell of {len(written)} characters")

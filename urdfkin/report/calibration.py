@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,13 +14,13 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import counted
+from urdfkin.system.documents import plain
 
 #: If (residuals) / (stated noise) is below this number, the residuals are only rounding errors.
 _ROUNDING = 0.5
 
 
 def document(found: Calibration) -> TextDocument:
-    """Return a calibration: parameters, errors, noise, base, tool and warnings."""
     model, identification = found.model, found.identification
     poses = f", {counted(len(found.fitted.errors), 'pose')}" if found.fitted is not None else ""
     title = f"{found.robot.name}: {model.base} to {model.tip}{poses}"
@@ -48,9 +48,7 @@ def document(found: Calibration) -> TextDocument:
     if found.fitted is None or found.before is None:
         return TextDocument(title, parts)
     noise = found.fitted.noise
-    said = f"{length(noise.metres)}" + (
-        f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else ""
-    )
+    said = length(noise.metres) + (f", {angle(noise.radians)}" if found.fitted.errors.shape[1] == 6 else "")
     every = sum(p in found.writable for p in identification.kept)
     few = found.written_fit is not None and len(found.written_parameters) < every
     as_written = (
@@ -61,9 +59,8 @@ def document(found: Calibration) -> TextDocument:
     parts.append(f"rms error before the fit: {_rms(found.before)}; after: {_rms(found.fitted)}{as_written}")
     if few:
         parts.append(
-            f"written: {len(found.written_parameters)} of {every} parameters, those that changed by more"
-            " than "
-            "2 sigma"
+            f"written: {len(found.written_parameters)} of {every} parameters, those that changed by more than"
+            " 2 sigma"
         )
     if not found.stated and not found.fitted.is_judged:
         parts.append("noise: unknown, because there are no redundant measurements")
@@ -83,7 +80,6 @@ def document(found: Calibration) -> TextDocument:
 
 
 def moved_table(written: Rewritten) -> Table:
-    """Return a table with the distance and the angle by which each joint's origin changed."""
     rows = [(joint, length(shift), angle(turn)) for joint, (shift, turn) in written.moved.items()]
     return Table(["joint", "origin moved by", "rotated by"], rows)
 
@@ -105,7 +101,6 @@ def _written(T: FloatArray) -> str:
 
 
 def as_data(found: Calibration) -> dict[str, Any]:
-    """Return the calibration as JSON data; null for unknown values."""
     identification = found.identification
     data: dict[str, Any] = {
         "robot": found.robot.name,
@@ -120,7 +115,7 @@ def as_data(found: Calibration) -> dict[str, Any]:
                 "unit": parameter.unit or "1",
                 "fitted": k in identification.kept,
                 "moved": float(found.values[k]) if found.fitted is not None else None,
-                "deviation": _finite(found.deviations[k]) if found.fitted is not None else None,
+                "deviation": found.deviations[k] if found.fitted is not None else None,
                 "written": float(found.written_values[k]) if k in found.written_parameters else None,
                 "still_because": identification.still.get(k),
             }
@@ -131,9 +126,9 @@ def as_data(found: Calibration) -> dict[str, Any]:
         return data
     fitted = found.fitted
     names = ("base", found.base), ("tool", found.tool)
-    return data | {
+    data |= {
         "covariance_of": [str(found.parameters[k]) for k in identification.kept],
-        "covariance": [[_finite(x) for x in row] for row in fitted.covariance],
+        "covariance": fitted.covariance,
         "noise": {"metres": fitted.noise.metres, "radians": fitted.noise.radians}
         if found.stated or fitted.is_judged
         else None,
@@ -142,15 +137,12 @@ def as_data(found: Calibration) -> dict[str, Any]:
             for when, fit in (("before", found.before), ("after", fitted), ("as_written", found.written_fit))
             if fit is not None
         },
-        "residuals": fitted.errors.tolist(),
+        "residuals": fitted.errors,
         "odd_poses": list(found.odd),
         "doubts": doubts(found),
         "objections": list(found.plausibility.objections),
         "likeliest_reason": found.plausibility.reason,
-        "placements": {name: T.tolist() for name, T in names if T is not None},
-        "origins": {joint: T.tolist() for joint, T in found.origins.items()},
+        "placements": {name: T for name, T in names if T is not None},
+        "origins": found.origins,
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return cast("dict[str, Any]", plain(data))

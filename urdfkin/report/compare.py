@@ -35,9 +35,9 @@ from urdfkin.system.documents import Header, Layout, plain, says
 from urdfkin.validation.document import Check, Document, Joint, Model, Robot, Units, outcome_of
 from urdfkin.verify.oracles import versions
 
-#: Maximum length of a text; longer texts are truncated.
+#: Longer texts are truncated to this length.
 _LONGEST = 200
-#: Precision of a displayed pose: numbers are rounded to nine decimals.
+#: The numbers of a displayed pose are rounded to nine decimals.
 _PRECISION = Tolerance(1e-9, 1e-9)
 
 
@@ -50,12 +50,12 @@ def model_changes(old: Model | None, new: Model | None) -> Iterator[tuple[str, s
             yield f"joint {name}", was["kind"] if was else "", now["kind"] if now else ""
             continue
         for aspect, first, second in _joint_changes(was, now):
-            yield f"joint {name}, {aspect}", _cut(first), _cut(second)
+            yield f"joint {name}, {aspect}", shortened(first, _LONGEST), shortened(second, _LONGEST)
     if old is not None and new is not None:
         for entry, what in (("base", "base frame"), ("tip", "tip frame"), ("coordinates", "coordinates")):
             frames = dict(old)[entry], dict(new)[entry]
             if frames[0] != frames[1]:
-                yield what, _cut(_names(frames[0])), _cut(_names(frames[1]))
+                yield what, shortened(_names(frames[0]), _LONGEST), shortened(_names(frames[1]), _LONGEST)
 
 
 def _joints(model: Model | None) -> dict[str, Joint]:
@@ -63,7 +63,6 @@ def _joints(model: Model | None) -> dict[str, Joint]:
 
 
 def _joint_changes(was: Joint, now: Joint) -> Iterator[tuple[str, str, str]]:
-    """Yield the changes of one joint, with lengths and angles as text."""
     for entry, aspect in (("kind", "kind"), ("parent", "parent link"), ("child", "child link")):
         if dict(was)[entry] != dict(now)[entry]:
             yield aspect, str(dict(was)[entry]), str(dict(now)[entry])
@@ -102,12 +101,7 @@ def _names(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def _cut(text: str) -> str:
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 4] + " ..."
-
-
 def document(old: Document, new: Document, found: Comparison) -> TextDocument:
-    """Return the changes between two reports as a document."""
     parts: list[str | Table] = [
         f"{title}: {one['started']}, {summary(one)}" for title, one in (("old", old), ("new", new))
     ]
@@ -120,21 +114,18 @@ def document(old: Document, new: Document, found: Comparison) -> TextDocument:
 
 
 def verdict(found: Comparison) -> str:
-    """Return the outcome in one line."""
     if found.regressions:
         return f"{counted(len(found.regressions), 'regression')}, {counted(len(found.changes), 'change')}"
     return f"no regression, {counted(len(found.changes), 'change')}"
 
 
 def _exit(found: Comparison) -> str:
-    """Return the exit code of the command, with its meaning."""
     if found.regressions:
         return "exit 1: a regression"
     return "exit 0: changes without a regression" if found.changes else "exit 0"
 
 
 def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LIMIT) -> str:
-    """Return the changes as Markdown for a comment on a pull request."""
     mark = "❌" if found.regressions else "✅"
     lines = [f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}", ""]
     lines += ["| worst, eps·scale | old | new |", "| --- | ---: | ---: |"]
@@ -168,11 +159,11 @@ def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else units(value)
 
 
-#: If the largest disagreement of a robot grows by more than this factor, the change is a regression. It may
-#: grow by a smaller factor, because the maximum over random samples varies.
+#: If the largest disagreement of a robot grows by more than this factor, the change is a regression.
+#: It may grow by a smaller factor, because the maximum over random samples varies.
 FACTOR = 2.0
-#: If the largest disagreement is below this number (in units of eps * scale), a change of the disagreement is
-#: no regression. A single rounding error can be as large as this number.
+#: A disagreement below this number (in eps * scale) is no regression.
+#: A single rounding error can be as large as this number.
 FLOOR = 2.0
 #: A disagreement below this fraction of its bound is no regression.
 _SHARE_FLOOR = 0.1
@@ -184,10 +175,8 @@ class Change:
 
     Attributes:
         robot: The robot's source; None for the run as a whole.
-        what: Name of the changed value.
         old: Old value as text; empty if it was missing.
         new: New value as text; empty if it is missing.
-        regression: Whether the change is a regression.
     """
 
     robot: str | None
@@ -203,24 +192,17 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All changes between two reports.
-
-    Attributes:
-        changes: The changes.
-        sha256: SHA-256 of each robot's text in the new report.
-    """
+    """All changes between two reports, and the SHA-256 of each robot's text in the new report."""
 
     changes: tuple[Change, ...]
     sha256: tuple[str | None, ...] = ()
 
     @property
     def regressions(self) -> tuple[Change, ...]:
-        """The changes that are regressions."""
         return tuple(change for change in self.changes if change.regression)
 
     @property
     def exit_code(self) -> int:
-        """1 if there is a regression, else 0."""
         return 1 if self.regressions else 0
 
     def as_dict(self, command: str | None = None) -> ComparisonDocument:
@@ -255,7 +237,7 @@ class ComparisonDocument(Header):
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
 
 
-#: The layout of the document.
+#: Layout of the document
 COMPARISON = Layout(
     "urdfkin-comparison/1",
     ComparisonDocument,
@@ -267,20 +249,13 @@ COMPARISON = Layout(
 def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
     """Compare two reports.
 
-    Args:
-        old: The old report.
-        new: The new report.
-        factor: The largest disagreement of a robot may grow by this factor without a regression.
-
-    Returns:
-        All changes, each marked if it is a regression.
+    The largest disagreement of a robot may grow by `factor` without a regression.
     """
     changes = [*_run(old, new), *_robots(old, new, factor)]
     return Comparison(tuple(changes), tuple(new["sha256"]))
 
 
 def _run(old: Document, new: Document) -> Iterator[Change]:
-    """Yield changed versions, settings and outcomes, and whether only one of the two runs was interrupted."""
     yield from _mapping("version of ", old["versions"], new["versions"])
     yield from _mapping("", *({"seed": str(d["seed"])} for d in (old, new)))
     if old["samples"] != new["samples"]:
@@ -332,7 +307,7 @@ def by_source(document: Document) -> dict[str, Robot]:
 
 
 def renamed_files(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[str, str]:
-    """Return the renamed files. A file was renamed if a missing and a new source have the same robot name."""
+    """Return renamed files: a missing and a new source have the same robot name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, cast
 
 from urdfkin.comparison.diff import Change, Changes, motion_words, word
 from urdfkin.comparison.result import angle, length
@@ -12,16 +12,14 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import counted
+from urdfkin.system.documents import plain
 
-#: Titles of the columns.
+#: Titles of the columns
 HEADS = ("element", "what", "old", "new", "alone")
 
 
 def headline(found: Changes) -> str:
-    """Return one line about all changes.
-
-    The text has the number of changes, and the distance by which all changes together move a frame.
-    """
+    """Return the number of changes, and the distance by which all together move a frame."""
     rounding = ""
     if found.rounding is not None:
         metres, radians = found.rounding
@@ -35,14 +33,7 @@ def headline(found: Changes) -> str:
     return f"{head}; together they {motion_words(found.total)}"
 
 
-def _by_element(found: Changes) -> dict[str, list[Change]]:
-    grouped: dict[str, list[Change]] = {}
-    for change in found.changes:
-        grouped.setdefault(change.element, []).append(change)
-    return grouped
-
-
-#: Columns of the table of several pairs.
+#: Columns of the table of pairs
 PAIRS = ("old", "new", "changes")
 
 
@@ -55,7 +46,6 @@ def pairs_document(found: Sequence[Changes]) -> TextDocument:
 
 
 def pairs_markdown(found: Sequence[Changes]) -> str:
-    """Return the table of all pairs, and a table of the changes of each pair, as Markdown."""
     lines = [f"| {' | '.join(PAIRS)} |", f"|{' --- |' * len(PAIRS)}"]
     lines += [f"| {' | '.join(map(text, (*one.sources, headline(one))))} |" for one in found]
     parts = ["\n".join([*lines, ""])]
@@ -66,7 +56,10 @@ def pairs_markdown(found: Sequence[Changes]) -> str:
 def lines_of(found: Changes) -> list[str]:
     """Return the changes as lines; a changed joint also has a line with the distance that a frame moves."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
-    for element, changes in _by_element(found).items():
+    by_element: dict[str, list[Change]] = {}
+    for change in found.changes:
+        by_element.setdefault(change.element, []).append(change)
+    for element, changes in by_element.items():
         lines += [f"  {change}" for change in changes]
         if (effect := found.effect_of.get(element)) is not None:
             lines.append(f"    {effect}")
@@ -74,7 +67,6 @@ def lines_of(found: Changes) -> list[str]:
 
 
 def document(found: Changes) -> TextDocument:
-    """Return the changes as a table."""
     parts: list[str | Table] = [f"{found.sources[0]} \u2192 {found.sources[1]}"]
     parts += [Table(HEADS, rows_of(found), left=len(HEADS))] if found else []
     return TextDocument(headline(found), parts)
@@ -117,10 +109,9 @@ def as_data(found: Changes) -> dict[str, Any]:
     def far(interval: Any) -> dict[str, Any] | None:
         if interval is None:
             return None
-        upper = None if interval.upper == float("inf") else interval.upper
-        return {"frame": interval.frame, "lower": interval.lower, "upper": upper}
+        return {"frame": interval.frame, "lower": interval.lower, "upper": interval.upper}
 
-    return {
+    data = {
         "sources": list(found.sources),
         "changes": [
             {
@@ -135,9 +126,6 @@ def as_data(found: Changes) -> dict[str, Any]:
         ],
         "effects": [{"element": e.element, **(far(e.interval) or {})} for e in found.effects],
         "total": far(found.total),
-        "rounding": found.rounding
-        and {
-            name: size if isfinite(size) else None
-            for name, size in zip(("metres", "radians"), found.rounding, strict=True)
-        },
+        "rounding": found.rounding and dict(zip(("metres", "radians"), found.rounding, strict=True)),
     }
+    return cast("dict[str, Any]", plain(data))

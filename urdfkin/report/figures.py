@@ -1,12 +1,9 @@
 """Histograms of the disagreements, and the data of the 3D view.
 
 The plot has one row for each quantity, with all reference frames together. The x axis of the histogram is
-logarithmic and shows the disagreement in eps * scale. The histogram shows the results, and the triangle shows
-the worst result. The bar shows the range of the bound over all frames. Different frames have different
-bounds, so the bar is a range. If all results are verified, the histogram lies left of the bar.
-
-The data of the 3D view is compact: links, joints and chains with their tables. The numbers of the 3D view
-have seven digits for display; the JSON document has the full numbers.
+logarithmic and shows the disagreement in eps * scale. The triangle shows the worst result. The bar shows the
+range of the bound over all frames, because different frames have different bounds. If all results are
+verified, the histogram lies left of the bar. The numbers of the 3D view have seven digits.
 """
 
 from __future__ import annotations
@@ -24,7 +21,7 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
 
 
-#: Left end of the axis in eps * scale. Smaller disagreements are drawn as exact.
+#: The axis begins at this number of eps * scale; smaller disagreements are drawn as exact.
 _LEFT = 1e-2
 _HEIGHT = 0.82
 
@@ -92,7 +89,7 @@ def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray, righ
     )
     _bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    if largest is None or largest > right:  # not on the axis: draw a separate mark at its right end
+    if largest is None or largest > right:  # A separate mark is at the right end.
         axes.annotate(
             "✗ not finite" if largest is None else f"✗ {units(largest)} ▸",
             (1.0, base + 0.13),
@@ -156,15 +153,14 @@ _KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 def scene(model: Model, chains: list[Chain]) -> dict[str, Any]:
     """Return a robot as data for the script of the page, `assets/view3d.js`.
 
-    Returns:
-        A dict with these entries, among others.
+    Entries of the dict, among others:
 
-        * `links`: the names.
-        * `joints`: one list for each joint. It contains the name, the index of the kind, the parent link, the
-          child link, the pose in the parent (three rows of four), the axis or 0, the index in q or -1, the
-          lower and the upper limit (None: no limit), and the mimic rule or 0. A mimic rule is the mimicked
-          joint's index in q, the multiplier and the offset.
-        * `chains`: the base link, the tip link and two tables for each chain.
+    * `links`: the names.
+    * `joints`: one list for each joint. It contains the name, the index of the kind, the parent link, the
+      child link, the pose in the parent (three rows of four), the axis or 0, the index in q or -1, the
+      lower and the upper limit (None: no limit), and the mimic rule or 0. A mimic rule is the mimicked
+      joint's index in q, the multiplier and the offset.
+    * `chains`: the base link, the tip link and two tables for each chain.
     """
     links = {name: i for i, name in enumerate(model["links"])}
     joints = {joint["name"]: i for i, joint in enumerate(model["joints"])}
@@ -218,7 +214,6 @@ def _table(table: Table, joints: dict[str, int]) -> dict[str, Any]:
 
 
 def _link(frame: str, links: dict[str, int], joints: dict[str, int]) -> int:
-    """Return the index of the link that carries a frame."""
     kind, _, rest = frame.partition(":")
     if kind in ("link", "joint") and (rest in links or rest in joints):
         frame = rest

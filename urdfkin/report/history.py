@@ -2,8 +2,7 @@
 
 Runs are ordered by their start. Robots in two reports are matched by their source. If a file was renamed, its
 robot is matched by the robot's name, as in `compare`. Each report is read twice, first for its start time and
-then for its results, so that only one report at a time is in memory. A report that cannot be used is listed
-with the reason; the others are shown.
+then for its results, so that only one report at a time is in memory.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.report.compare import Change, ChangeEntry, by_source, compare, renamed_files
-from urdfkin.report.html import as_is, asset, environment, when
+from urdfkin.report.html import rendered, when
 from urdfkin.report.reading import checked, stored_document
 from urdfkin.report.words import VERDICTS, counted, percent, share_of, units, worst
 from urdfkin.system.documents import Count, Header, Layout, Sha256, parse_json, plain, says
@@ -30,17 +29,17 @@ from urdfkin.validation.document import VALIDATION, Document, Robot, Units
 from urdfkin.validation.outcome import OUTCOMES
 from urdfkin.verify.oracles import versions
 
-#: Largest number of reports in a history, and largest number of files in a folder.
+#: A history has at most `MOST_RUNS` reports, and a folder at most `MOST_FILES` files.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: On a terminal, each robot has marks for the latest `MARKED` runs. On the page, the charts show the latest
-#: `CHARTED` runs.
+#: On a terminal, each robot has marks for the latest `MARKED` runs.
+#: On the page, the charts show the latest `CHARTED` runs.
 MARKED, CHARTED = 20, 60
-#: Number of latest changes that are shown without --all, and for each robot on the page.
+#: This number of latest changes is shown without --all, and for each robot on the page.
 SHOWN = 20
 _LISTED = 500
-#: A mark for each verdict.
+#: Mark of each verdict
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: Lower end of the axis in the chart of disagreements: 10^-3 times the bound.
+#: The axis of the chart of disagreements begins at 10^-3 times the bound.
 _LOWEST = -3.0
 
 
@@ -107,16 +106,13 @@ class HistoryDocument(Header):
     repeated: Annotated[list[Unused], says("Files that repeat a validation run of another file.")]
 
 
-#: The layout of the document.
+#: Layout of the document
 HISTORY = Layout(
-    "urdfkin-history/1",
-    HistoryDocument,
-    tuple(OUTCOMES.values()),
-    "urdfkin report history DIR --format json",
+    "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
 
-#: The changes of each source, with their runs.
+#: Changes of each source
 Told = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
@@ -139,7 +135,6 @@ class History:
 
     @property
     def exit_code(self) -> int:
-        """The exit code: 0 if every file was used, otherwise 2."""
         return 2 if self.unusable else 0
 
     def as_dict(self, command: str | None = None) -> HistoryDocument:
@@ -163,14 +158,8 @@ class History:
 def history(paths: Sequence[Path]) -> History:
     """Read reports and return their history.
 
-    Args:
-        paths: JSON files of `urdfkin validate --json`, stores, and folders with such files and stores.
-
-    Returns:
-        The runs in the order of their start, and the results of each robot in each run.
-
-    Raises:
-        InputError: No report can be used, or there are too many reports.
+    The paths are JSON files of `urdfkin validate --json`, stores, and folders with such files and stores.
+    InputError is raised if no report can be used, or if there are too many reports.
     """
     found = History()
     before: Document | None = None
@@ -196,14 +185,11 @@ def _rank(found: History, points: Sequence[Point]) -> tuple[bool, int]:
 
 
 def _files(paths: Sequence[Path]) -> Iterator[Path]:
-    """Yield the path of each report, which is a file or a store.
-
-    A folder contributes all its files with the suffix .json, at any depth.
-    """
+    """Yield the path of each file or store; a folder contributes its files *.json at any depth."""
     count = 0
     for path in paths:
-        inside = _in_folder(path) if is_folder(path) and not _is_store(path) else iter([path])
-        for file in inside:
+        has_reports = is_folder(path) and not (path / "manifest.json").is_file()
+        for file in _in_folder(path) if has_reports else iter([path]):
             count += 1
             if count > MOST_RUNS:
                 raise InputError(
@@ -212,10 +198,6 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
                     remedy="name fewer files, or a folder with fewer files",
                 )
             yield file
-
-
-def _is_store(path: Path) -> bool:
-    return (path / "manifest.json").is_file()
 
 
 def _in_folder(folder: Path) -> Iterator[Path]:
@@ -336,12 +318,7 @@ def _point(run: int, source: str, robot: Robot) -> Point:
 
 
 def document(found: History, *, all_: bool = False) -> TextDocument:
-    """Return the history for a terminal: runs, robots, and the latest changes.
-
-    Args:
-        found: The history.
-        all_: Whether to show all runs and changes, not only the latest.
-    """
+    """Return the history for a terminal; with `all_`, show all runs and changes, not only the latest."""
     some = None if all_ else SHOWN
     first = 0 if all_ else max(0, len(found.runs) - SHOWN)
     runs = [
@@ -426,7 +403,6 @@ def _of(told: Told, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
 
 
 def words_of(change: ChangeEntry) -> str:
-    """Return a change in one line."""
     words = str(Change(**change))
     return f"REGRESSION {words}" if change["regression"] else words
 
@@ -443,31 +419,27 @@ def _date(run: Run) -> str:
 def as_html(found: History, command: str | None = None) -> str:
     """Return a page with charts and the history of each robot. The template escapes all names."""
     told = _by_robot(found)
-    return (
-        environment()
-        .get_template("history.html.j2")
-        .render(
-            headline=headline(found),
-            runs=found.runs,
-            last=found.runs[-1],
-            dates=[_date(run) for run in found.runs],
-            when=when(found.runs[-1]["started"]),
-            charted=range(max(0, len(found.runs) - CHARTED), len(found.runs)),
-            stacks=_stacks(found),
-            height=_height,
-            robots=[_robot(found, robot, points, told) for robot, points in found.robots.items()],
-            changes=changes(found)[:SHOWN],
-            total=len(changes(found)),
-            unusable=found.unusable,
-            repeated=found.repeated,
-            marks=MARKS,
-            listed=_LISTED,
-            units=units,
-            share=_share,
-            command=command,
-            versions=versions(),
-            style=as_is(asset("report.css")),
-        )
+    return rendered(
+        "history.html.j2",
+        headline=headline(found),
+        runs=found.runs,
+        last=found.runs[-1],
+        dates=[_date(run) for run in found.runs],
+        when=when(found.runs[-1]["started"]),
+        charted=range(max(0, len(found.runs) - CHARTED), len(found.runs)),
+        stacks=_stacks(found),
+        height=_height,
+        robots=[_robot(found, robot, points, told) for robot, points in found.robots.items()],
+        changes=changes(found)[:SHOWN],
+        total=len(changes(found)),
+        unusable=found.unusable,
+        repeated=found.repeated,
+        marks=MARKS,
+        listed=_LISTED,
+        units=units,
+        share=_share,
+        command=command,
+        versions=versions(),
     )
 
 

@@ -1,8 +1,8 @@
 """Report as an HTML page that works offline, uses no network and escapes every name.
 
-A large report is split: the page has the summary, and a file for each robot has its details. When you unfold
-a robot on the page, the page loads this robot's file. The files are scripts, because a page that is opened
-from disk cannot load other types of files.
+A large report is split: the page has the summary, and a file for each robot has its details. The page loads
+a robot's file when you unfold the robot. The files are scripts, because a page that is opened from disk
+cannot load other types of files.
 """
 
 from __future__ import annotations
@@ -47,22 +47,21 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-#: Maximum number of robots for which all details are open when the page loads.
+#: With at most this number of robots, all details are open when the page loads.
 _OPEN = 1
-#: Number of failed robots whose details are open when the page loads. Failed robots come first.
+#: The details of the first failed robots are open when the page loads.
 _FAILURES_OPEN = 20
-#: With more robots than this, histograms are drawn only for robots that are not verified. A histogram
-#: takes a second.
+#: With more robots than this, histograms are drawn only for robots that are not verified.
+#: A histogram takes a second.
 _DRAWN = 100
-#: Maximum length in characters of the details of all robots together. If they are longer, each robot's
-#: details are in a separate file.
+#: If the details of all robots have more characters, each robot's details are in a separate file.
 MOST = 5_000_000
 
 
 @cache
 def environment() -> Environment:
     """Return the template environment. It escapes every name and rejects undefined variables."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415  keeps --help fast
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415  --help stays fast
 
     environment = Environment(
         loader=PackageLoader("urdfkin.report"),
@@ -77,13 +76,16 @@ def environment() -> Environment:
     return environment
 
 
+def rendered(template: str, **values: Any) -> str:
+    """Return a page with the common style sheet."""
+    return environment().get_template(template).render(style=as_is(asset("report.css")), **values)
+
+
 def asset(name: str) -> str:
-    """Return the text of a file in `urdfkin/report/assets`."""
     return resources.files("urdfkin.report").joinpath("assets", name).read_text(encoding="utf-8")
 
 
 def as_is(text: str) -> Markup:
-    """Mark a trusted text, which a template does not escape."""
     from markupsafe import Markup  # noqa: PLC0415
 
     return Markup(text)
@@ -99,15 +101,10 @@ def as_html(document: Document) -> str:
 
 
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
-    """Yield the files of a report, the page last.
+    """Yield the path of each file relative to the page, and its text; the page is last.
 
-    Args:
-        document: The report's data.
-        name: File name of the page. For `report.html`, the robots' files are in the folder `report-robots`.
-
-    Yields:
-        The path of each file relative to the page, and its text. If all details together are longer than
-        `MOST` characters, each robot has its own file.
+    If all details together are longer than `MOST` characters, each robot has its own file. For the page
+    `report.html`, these files are in the folder `report-robots`.
     """
     document = _worst_first(document)
     robots, folder = document["robots"], f"{name.removesuffix('.html')}-robots"
@@ -139,33 +136,29 @@ def _details(robot: dict[str, Any], document: Document) -> str:
 
 def _page(document: Document, robots: list[dict[str, Any]], token: str = "", folder: str = "") -> str:
     quantities = columns(document["robots"])
-    return (
-        environment()
-        .get_template("report.html.j2")
-        .render(
-            document=document,
-            outcome=outcome_of(document),
-            summary=summary(document),
-            when=when(document["started"]),
-            pinocchio=pinocchio(document),
-            compared=compared(),
-            not_compared=not_compared(),
-            totals=_totals(document),
-            model=_model_verdict(document),
-            verdicts=verdict_counts(document),
-            quantities=list(quantities),
-            overview=[pages.overview(robot, list(quantities.values())) for robot in document["robots"]],
-            robots=robots,
-            opened=len(robots) <= _OPEN,
-            heat_steps=pages.HEAT_STEPS,
-            token=token,
-            folder=folder,
-            style=as_is(asset("report.css")),
-            script=as_is(asset("report.js")),
-            view_script=as_is(asset("view3d.js")),
-            three=as_is(asset("three.min.js")),
-            three_licence=asset("three.LICENSE.txt"),
-        )
+    return rendered(
+        "report.html.j2",
+        document=document,
+        outcome=outcome_of(document),
+        summary=summary(document),
+        when=when(document["started"]),
+        pinocchio=pinocchio(document),
+        compared=compared(),
+        not_compared=not_compared(),
+        totals=_totals(document),
+        model=_model_verdict(document),
+        verdicts=verdict_counts(document),
+        quantities=list(quantities),
+        overview=[pages.overview(robot, list(quantities.values())) for robot in document["robots"]],
+        robots=robots,
+        opened=len(robots) <= _OPEN,
+        heat_steps=pages.HEAT_STEPS,
+        token=token,
+        folder=folder,
+        script=as_is(asset("report.js")),
+        view_script=as_is(asset("view3d.js")),
+        three=as_is(asset("three.min.js")),
+        three_licence=asset("three.LICENSE.txt"),
     )
 
 

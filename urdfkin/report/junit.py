@@ -1,11 +1,8 @@
 """JUnit XML of a report, and of the checks of `urdfkin verify`.
 
-A report has a test suite for each robot, with a test case for each quantity and reference frame. `verify`
-has one suite, with a test case for each function.
-
-The layout conforms to the schema of Jenkins, junit-10.xsd. GitLab, GitHub actions and other programs read
-this layout. Some of these programs ignore the XML attributes of the element `failure`. The text of this
-element therefore contains all information.
+The layout conforms to the schema of Jenkins, junit-10.xsd, which other programs read too. Some of these
+programs ignore the XML attributes of the element `failure`. The text of this element therefore contains all
+information.
 """
 
 from __future__ import annotations
@@ -30,12 +27,12 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: Characters that XML 1.0 forbids, even escaped.
+#: XML 1.0 forbids these characters, even escaped.
 _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def as_junit(document: Document) -> bytes:
-    """Return the report as a JUnit XML file."""
+    """Return a JUnit XML file with a suite for each robot, and a case for each quantity and reference."""
     suites = [_suite(robot, document) for robot in document["robots"]]
     if _incomplete(document):
         suites.insert(0, _whole_run(document))
@@ -55,10 +52,9 @@ def _bytes(root: ET.Element) -> bytes:
 
 
 def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
-    """Return the checks of `urdfkin verify` as a JUnit XML file.
+    """Return the checks of `urdfkin verify` as a JUnit XML file with a test case for each function.
 
-    Each function has a test case. The test case fails if the function disagrees with the reference, or if no
-    oracle confirms the reference.
+    The test case fails if the function disagrees with the reference, or if no oracle confirms the reference.
     """
     cases = [_function_case(check) for check in checks]
     failures = str(sum(case.find("failure") is not None for case in cases))
@@ -144,7 +140,6 @@ def _case(check: Check, robot: Robot) -> ET.Element:
 
 
 def _verdict(robot: Robot) -> ET.Element:
-    """Return a test case with a robot's verdict and all its reasons."""
     case = ET.Element("testcase", {"name": "verdict", "classname": f"urdfkin.{_clean(robot['source'])}"})
     reason = _clean(robot["reason"] or f"{robot['results']:,} results compared")
     text = f"{robot['verdict']}: {reason}" + (f"\n{_clean(error)}" if (error := robot.get("error")) else "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
@@ -25,17 +25,6 @@ def print_document(out: Console, document: TextDocument) -> None:
                 out.print(line)
         else:
             out.print(part, style=getattr(part, "style", None))
-
-
-def print_named(
-    out: Console,
-    columns: Sequence[str],
-    rows: Iterable[Sequence[str | float]],
-    *,
-    left: Collection[int] = (0,),
-) -> None:
-    """Print a table with the given columns and rows; the columns in `left` are left-aligned."""
-    print_table(out, Table(columns, list(rows), left))
 
 
 def print_table(out: Console, table: Table) -> None:
@@ -76,10 +65,7 @@ def print_table(out: Console, table: Table) -> None:
 
 
 def fits(out: Console, table: Table) -> bool:
-    """Whether a table fits the width of the terminal.
-
-    Two columns are separated by two spaces, and one space follows the last column.
-    """
+    """Whether a table fits the terminal; two spaces separate columns, and one follows the last column."""
     return sum(width + 2 for width in _cells(table)[2]) - 1 <= out.width
 
 

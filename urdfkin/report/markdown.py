@@ -23,18 +23,17 @@ from urdfkin.report.words import (
 )
 from urdfkin.validation.document import Document, Robot, outcome_of
 
-#: Maximum length. GitHub accepts comments of up to 65,536 characters.
+#: GitHub accepts comments of up to 65,536 characters.
 LIMIT = 60_000
 _MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad input": "⛔"}
-#: Maximum number of failed checks that are shown for each robot.
+#: At most this number of failed checks is shown for each robot.
 _SHOWN = 3
 
 
 def as_markdown(document: Document) -> str:
-    """Return the report as a comment.
+    """Return the report as a comment, failed robots first.
 
-    Failed robots come first. If the comment is too long, some robots are left out, and a line states their
-    number.
+    If the comment is too long, some robots are left out, and a line states their number.
     """
     found = outcome_of(document)
     head = [
@@ -62,10 +61,6 @@ def as_markdown(document: Document) -> str:
 
 
 def _three_sides(robots: list[Robot]) -> list[str]:
-    """Return the table of a comparison with a second oracle.
-
-    The table has one row for each quantity, over all robots.
-    """
     if (title := second_oracle_title(robots)) is None:
         return []
     heads = ["quantity", *map(text, second_oracle_heads(title))]
@@ -118,7 +113,6 @@ def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
 
 
 def _details(robot: Robot) -> list[str]:
-    """Return the failures of one robot."""
     lines: list[str] = []
     if robot["reason"]:
         lines += ["", f"**{markdown_code(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]
@@ -149,5 +143,4 @@ def fenced(code: str) -> str:
 
 
 def shortened(words: str, length: int) -> str:
-    """Truncate a text to `length` characters."""
     return words if len(words) <= length else words[: length - 4] + " ..."

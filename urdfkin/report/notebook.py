@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from urdfkin.errors.escape import log_line
 from urdfkin.report.figures import scene
-from urdfkin.report.html import as_is, asset, environment
+from urdfkin.report.html import as_is, asset, rendered
 from urdfkin.report.reading import moving_names
 from urdfkin.validation.robot_summary import describe
 
@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
 
 class Cell:
-    """The 3D view that `Robot.view` returns in a notebook.
-
-    Args:
-        robot: The robot.
-        q: (nq,) configuration at the start.
-        height: Height in pixels.
-    """
+    """The 3D view that `Robot.view` returns in a notebook: `q` (nq,) at the start, `height` in pixels."""
 
     def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
         self._name, self._height = robot.name, height
@@ -33,18 +27,13 @@ class Cell:
         return log_line(f"<a view of {self._name}, which is displayed as the last line of a notebook cell>")
 
     def page(self) -> str:
-        """Return the HTML page."""
         data: dict[str, Any] = {"source": self._name, "joints": moving_names(self._description), "chains": []}
-        return (
-            environment()
-            .get_template("cell.html.j2")
-            .render(
-                data=data,
-                robot={"index": 0, "scene": scene(self._description, []) | {"start": self._q}},
-                style=as_is(asset("report.css")),
-                three=as_is(asset("three.min.js")),
-                view_script=as_is(asset("view3d.js")),
-            )
+        return rendered(
+            "cell.html.j2",
+            data=data,
+            robot={"index": 0, "scene": scene(self._description, []) | {"start": self._q}},
+            three=as_is(asset("three.min.js")),
+            view_script=as_is(asset("view3d.js")),
         )
 
     def _repr_html_(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from urdfkin.dh.units import Units as DisplayUnits
 from urdfkin.model.configuration import range_words
@@ -26,27 +26,20 @@ from urdfkin.report.words import (
 )
 from urdfkin.validation.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
 
-if TYPE_CHECKING:
-    pass
-
-
 _READABLE = DisplayUnits(digits=6)
 
-#: Upper edges of the heat map's colour steps, as ratios of a disagreement to its bound. A result above the
-#: last edge is outside its bound.
+#: These ratios of a disagreement to its bound are the upper edges of the heat map's colour steps.
+#: A result above the last edge is outside its bound.
 HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A cell of the heat map: its text and its colour step."""
-
     text: str
     step: int
 
 
 def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
-    """Return a row of the overview table, with sort keys."""
     checks = robot["checks"]
     largest, share = worst(check["worst"] for check in checks), share_of(robot)
     return {
@@ -70,7 +63,7 @@ def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, 
 
 
 def reason(robot: Robot) -> str:
-    """Return the reason of a verdict. Omit errors of the file, which the page lists below as findings."""
+    """Return the reason of a verdict without the errors of the file, which the page lists as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -196,7 +189,7 @@ def _share(check: Check, subject: int) -> float:
     is the largest ratio in the whole check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
-    if not value:  # a disagreement of 0 lies within every bound
+    if not value:  # A disagreement of 0 lies within every bound.
         return math.inf if value is None else 0.0
     if not tightest:
         return math.inf
@@ -208,12 +201,10 @@ def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
 
     The cell of theta (revolute joint) or d (prismatic joint) also contains q.
     """
-    table = chain["standard"] if convention == "standard" else chain["modified"]
-    return [_dh_cells(row, has_beta(chain)) for row in table["rows"]]
+    return [_dh_cells(row, has_beta(chain)) for row in _rows(chain, convention)]
 
 
 def has_beta(chain: Chain) -> bool:
-    """Whether the standard or the modified table has a Hayati row."""
     return any(row["beta"] != 0.0 for key in ("standard", "modified") for row in _rows(chain, key))
 
 
@@ -227,14 +218,8 @@ def _dh_cells(row: Row, beta: bool) -> list[str]:
     d, theta = metres(row["d"]), angle(row["theta"])
     d = _plus(d, f"{sign} q") if is_prismatic else d
     theta = theta if is_prismatic else _plus(theta, f"{sign} q")
-    return [
-        row["joint"],
-        metres(row["a"]),
-        angle(row["alpha"]),
-        *([angle(row["beta"])] if beta else []),
-        d,
-        theta,
-    ]
+    betas = [angle(row["beta"])] if beta else []
+    return [row["joint"], metres(row["a"]), angle(row["alpha"]), *betas, d, theta]
 
 
 def _plus(constant: str, variable: str) -> str:
@@ -244,7 +229,6 @@ def _plus(constant: str, variable: str) -> str:
 
 
 def metres(value: float) -> str:
-    """Format a length in metres."""
     return _READABLE.length(value).replace("-", "−")
 
 
@@ -254,10 +238,6 @@ def angle(value: float) -> str:
 
 
 def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
-    """Return the rows of the accuracy study.
-
-    A row has the errors of urdfkin and of Pinocchio, and the more accurate of the two.
-    """
     return [
         {
             "quantity": quantity_name(line["quantity"]),
@@ -272,7 +252,6 @@ def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
 
 
 def check_rows(robot: Robot) -> list[dict[str, Any]]:
-    """Return the rows of the checks, with numbers as text."""
     return [
         {
             "quantity": quantity_name(check["quantity"]),
@@ -283,9 +262,9 @@ def check_rows(robot: Robot) -> list[dict[str, Any]]:
             "p99": units(check["p99"]),
             "worst": units(check["worst"]),
             "share": percent(check["share_of_bound"]),
-            "width": min(100.0, 100.0 * (check["share_of_bound"] or 0.0))
-            if check["share_of_bound"] is not None
-            else 100.0,
+            "width": 100.0
+            if check["share_of_bound"] is None
+            else min(100.0, 100.0 * check["share_of_bound"]),
             "case": check["worst_case"],
             "where": "" if check["worst_case"] is None else check["worst_case"]["frame"],
         }
@@ -294,7 +273,7 @@ def check_rows(robot: Robot) -> list[dict[str, Any]]:
 
 
 def failures(robot: Robot) -> list[dict[str, Any]]:
-    """Return the rows of the failed checks. The largest ratio of a disagreement to its bound comes first."""
+    """Return the rows of the failed checks, the largest ratio of a disagreement to its bound first."""
     failing = sorted(
         (check for check in robot["checks"] if check["failed"]),
         key=lambda check: -_sortable(check["share_of_bound"]),

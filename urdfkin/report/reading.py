@@ -31,11 +31,11 @@ from urdfkin.validation.error_stats import histogram_bin, percentile
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.robot_summary import chain_disagreement, reader_disagreement
 
-#: nq and nv of each kind of joint.
+#: nq and nv of joint kinds
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 _ONE = (1, 1)
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
-#: Tolerance of rotations and unit axes, which may come from text with 6 digits.
+#: Rotations and unit axes may come from text with 6 digits.
 _ROUNDED = 1e-5
 
 
@@ -45,7 +45,6 @@ def frame_names(model: Model) -> list[str]:
 
 
 def moving_names(model: Model) -> list[str]:
-    """Return the names of the moving joints, mimic joints included."""
     return [joint["name"] for joint in model["joints"] if joint["kind"] != "fixed"]
 
 
@@ -59,7 +58,6 @@ def _size(joint: Joint) -> tuple[int, int]:
 
 
 def model_contradictions(model: Model, chains: Sequence[Chain]) -> Iterator[str]:
-    """Yield the contradictions in a model and its chains."""
     links, joints = model["links"], model["joints"]
     names = [joint["name"] for joint in joints]
     if len(set(links)) != len(links) or len(set(names)) != len(names):
@@ -128,9 +126,9 @@ def _numbering(model: Model) -> Iterator[str]:
         )
 
 
-#: Relative tolerance of recomputed quotients.
+#: Relative tolerance of recomputed quotients
 _ALIKE = 1e-9
-#: Maximum plausible count.
+#: Maximum plausible count
 _MOST = 2**53
 
 
@@ -183,8 +181,10 @@ def _robot(robot: Robot, document: Document) -> Iterator[str]:
         for contradiction in _check(check, own, robot, document):
             yield f"{check_name(check)}: {contradiction}"
     for chain in robot["chains"]:
-        for contradiction in _chain(chain):
-            yield f"tables from {chain['base']} to {chain['tip']}: {contradiction}"
+        figures = chain["metres"], chain["worst"], chain["share_of_bound"]
+        if not chain["samples"] and any(figure is not None for figure in figures):
+            ends = f"{chain['base']} to {chain['tip']}"
+            yield f"tables from {ends}: the tables have results, but were not compared"
 
 
 def _subjects(robot: Robot) -> dict[str, list[str]]:
@@ -195,7 +195,6 @@ def _subjects(robot: Robot) -> dict[str, list[str]]:
 
 
 def _verdict(robot: Robot, samples: int) -> Iterator[str]:
-    """Yield contradictions between the verdict, its reason and the results of a robot."""
     verdict, reason = Verdict(robot["verdict"]), robot["reason"]
     second_differs = any(
         check["second_oracle"]["urdfkin"]["failed"] for check in robot["checks"] if "second_oracle" in check
@@ -247,7 +246,7 @@ def _check(check: Check, subjects: list[str], robot: Robot, document: Document) 
         yield f"`worst` is {check['worst']}, which is not in the last bin of the histogram"
     for name, percent, stated in (("median", 50.0, check["median"]), ("p99", 99.0, check["p99"])):
         computed = percentile(histogram, edges, _as_number(check["worst"]), percent)
-        if not _alike(_as_number(stated), computed):
+        if not math.isclose(_as_number(stated), computed, rel_tol=_ALIKE):
             yield f"`{name}` is {stated}, but the histogram gives {computed:g}"
     yield from _share(check)
     yield from _case(check, subjects, robot, document["samples"] + SPECIAL)
@@ -264,7 +263,7 @@ def _share(check: Check) -> Iterator[str]:
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `share_of_bound` is {share:g}"
     if low > high:
-        if share or largest or check["worst_case"]:  # nothing was compared, so there is no bound
+        if share or largest or check["worst_case"]:  # Nothing was compared, so there is no bound.
             yield f"`bound` is {check['bound']}, but something was compared"
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
@@ -305,21 +304,11 @@ def _case(check: Check, subjects: list[str], robot: Robot, samples: int) -> Iter
         yield f"`worst_case`: there is no sample {case['sample']} among {samples} samples"
 
 
-def _chain(chain: Chain) -> Iterator[str]:
-    figures = chain["metres"], chain["worst"], chain["share_of_bound"]
-    if not chain["samples"] and any(figure is not None for figure in figures):
-        yield "the tables have results, but were not compared"
-
-
 def _as_number(units: Units) -> float:
     return math.inf if units is None else units
 
 
-def _alike(a: float, b: float) -> bool:
-    return a == b or math.isclose(a, b, rel_tol=_ALIKE)
-
-
-#: Maximum number of contradictions in a message.
+#: A message shows at most this number of contradictions.
 _SHOWN = 3
 
 
@@ -335,19 +324,13 @@ def read_document(path: Path) -> Document:
 
 
 def stored_document(folder: Path) -> Document:
-    """Read the document from the store of a validation, with the same checks as for a JSON file.
-
-    Raises:
-        SourceError: The store cannot be read.
-        InputError: The folder is not a store, or its document contradicts itself.
-    """
-    from urdfkin.validation.campaign import stored  # noqa: PLC0415  needed for a store only
+    """Read the document from a store; the checks and errors are those of `read_document`."""
+    from urdfkin.validation.campaign import stored  # noqa: PLC0415  only a store needs this module
 
     return checked(stored(folder).as_dict(), str(folder))
 
 
 def checked(data: object, where: str) -> Document:
-    """Return `data` as a checked document. Raise InputError as `read_document` does."""
     document = VALIDATION.checked(data, where)
     if against := list(islice(contradictions(document), _SHOWN + 1)):
         more = " ..." if len(against) > _SHOWN else ""

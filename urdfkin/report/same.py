@@ -1,7 +1,4 @@
-"""Report the comparison of two models: on a terminal, as Markdown and as an HTML page.
-
-The page shows the verdict, the intervals and a picture of A and B at the worst configuration.
-"""
+"""Report the comparison of two models: on a terminal, as Markdown and as an HTML page."""
 
 from __future__ import annotations
 
@@ -24,24 +21,23 @@ from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.report.words import counted
 from urdfkin.robot import Robot
 
-#: Number of lines that are shown for each kind of difference without --all.
+#: Without --all, this number of lines is shown for each kind of difference.
 SHOWN = 12
 #: This line is printed if the models differ and their joints were not matched by name.
 GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
 HEADS = ("frame", "at least", "at most", "angle at most")
-#: Two attributes of `Interval`: the largest angle that was found, and the proven bound on the angle.
+#: These attributes of `Interval` are the largest found angle, and the proven bound on the angle.
 TURNED = ("radians_seen", "radians")
-#: The default question: are the two robots equivalent?
+#: This question asks whether the two robots are equivalent.
 EQUIVALENT = Question()
-#: A distance is printed only if its bound is larger than DUST times the rounding error. DUST is larger than 1
-#: because the sum of several terms has additional rounding errors.
+#: A distance is printed only if its bound is larger than DUST times the rounding error.
+#: The sum of several terms has additional rounding errors, so DUST is larger than 1.
 DUST = 1.001
-#: Heading of the list of joints with mimic joints that can exceed their own limits.
+#: This heading is for joints with mimic joints that can exceed their own limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
 def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
-    """Return the answer to a question in one line."""
     limits = sum(one.what == "limits" for one in found.remarks)
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if question.within is not None:
@@ -121,14 +117,9 @@ def _off(frame: Interval, rounding: tuple[float, float]) -> str:
 
 def far_frames(found: Sameness) -> list[Interval]:
     """Return the frames whose bound exceeds rounding, the frame with the largest bound first."""
-    return sorted(
-        (
-            frame
-            for frame in found.frames
-            if frame.upper > found.rounding[0] or frame.radians > found.rounding[1]
-        ),
-        key=lambda frame: (-frame.upper, -frame.lower),
-    )
+    metres, radians = found.rounding
+    far = [frame for frame in found.frames if frame.upper > metres or frame.radians > radians]
+    return sorted(far, key=lambda frame: (-frame.upper, -frame.lower))
 
 
 def farthest(found: Sameness) -> str:
@@ -142,7 +133,6 @@ def farthest(found: Sameness) -> str:
 
 
 def rows(frames: Sequence[Interval]) -> list[list[str]]:
-    """Return the rows of the table with the columns `HEADS`."""
     return [[frame.frame, length(frame.lower), length(frame.upper), angle(frame.radians)] for frame in frames]
 
 
@@ -189,13 +179,7 @@ def renamed(found: Sameness) -> list[str]:
 
 
 def document(found: Sameness, question: Question = EQUIVALENT, *, all_: bool = False) -> TextDocument:
-    """Return the answer and its reasons.
-
-    Args:
-        found: The result of `same`.
-        question: The question.
-        all_: Whether to show every line, not only the first dozen of a kind.
-    """
+    """Return the answer and its reasons; with `all_`, show every line, not only the first dozen of a kind."""
     sources = zip("AB", found.names, found.sources, strict=True)
     parts: list[str | Table] = [f"{which}: {name} ({source})" for which, name, source in sources]
     head = headline(found, question)
@@ -223,7 +207,7 @@ def _reasons(found: Sameness) -> tuple[tuple[str, ...], list[str]]:
     return found.after, [one.words for one in found.differences]
 
 
-#: Columns of the table of several pairs.
+#: Columns of the table of pairs
 PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
 
 
@@ -255,7 +239,6 @@ def pairs_document(found: Sequence[Sameness], question: Question = EQUIVALENT) -
 
 
 def pairs_markdown(found: Sequence[Sameness], question: Question = EQUIVALENT) -> str:
-    """Return the table of several pairs as Markdown."""
     rows = [PAIRS, ("---",) * len(PAIRS), *_pair_rows(found, question)]
     lines = [f"| {' | '.join(map(markdown_text, row) if k != 1 else row)} |" for k, row in enumerate(rows)]
     return "\n".join(lines) + "\n"
@@ -274,9 +257,7 @@ def as_document(found: Sameness) -> TextDocument:
         parts += [f"{head}: {line}" for line in lines[:SHOWN] if line]
         parts += [f"... and {len(lines) - SHOWN} more lines"] if len(lines) > SHOWN else []
     if frames := far_frames(found):
-        parts += [
-            f"{farthest(found)}:", Table(HEADS, rows(frames[:SHOWN])),
-        ]  # fmt: skip
+        parts += [f"{farthest(found)}:", Table(HEADS, rows(frames[:SHOWN]))]
         parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
         if off := attained(frames[0]):
             parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
@@ -284,10 +265,7 @@ def as_document(found: Sameness) -> TextDocument:
 
 
 def attained(frame: Interval) -> str:
-    """Return in words the distance between a frame of A and a frame of B at the worst configuration.
-
-    Return an empty text if the two frames coincide.
-    """
+    """Return the distance of two frames at the worst configuration in words; empty if they coincide."""
     parts = [length(frame.lower)] if frame.lower else []
     parts += [angle(frame.radians_seen)] if frame.radians_seen and not frame.lower else []
     return " and ".join(parts)
@@ -305,7 +283,6 @@ def _rest(n: int, some: int | None) -> list[str]:
 
 
 def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
-    """Return the answer as Markdown for a pull request's comment."""
     mark = "✅" if found.holds(question) else "❌"
     text = markdown_text
     names = " and ".join(
@@ -334,15 +311,15 @@ def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
     return "\n".join([*lines, text(str(found.checked)), ""])
 
 
-#: Half the side length of a picture in units of the SVG, and the fraction of the picture that the robots
-#: fill.
+#: `HALF` is half the side length of a picture in units of the SVG.
+#: The robots fill the fraction `FILLED` of the picture.
 HALF, FILLED = 150.0, 0.9
-#: Largest length of the scale bar, and its distance from the lower edge. The unit of the two numbers is the
-#: side length of the picture.
+#: `SCALE` is the largest length of the scale bar, relative to the side length of the picture.
+#: `FOOT` is the distance of the scale bar from the lower edge in units of the SVG.
 SCALE, FOOT = 0.3, 6.0
-#: Length of a frame's axes in the close view, as a share of the distance shown.
+#: The axes in the close view have this share of the distance between the two frames.
 AXIS = 0.35
-#: Two views, each with its title, and with the azimuth and elevation of the direction of view in radians.
+#: Each view has a title, and the azimuth and elevation of its direction in radians.
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
 
 
@@ -355,50 +332,40 @@ def as_html(
 ) -> str:
     """Return the HTML page with the answer. The template escapes all names.
 
-    Args:
-        found: The result of `same`.
-        robots: A and B.
-        question: The question.
-        options: Other options of the command. The page shows a command line that repeats the comparison.
-        started: Date and time on the page. None means the current time.
+    `options` are other options of the command line on the page. `started` is the date and time on the page.
     """
-    from urdfkin.report.html import as_is, asset, environment, when  # noqa: PLC0415  loads Jinja
+    from urdfkin.report.html import rendered, when  # noqa: PLC0415  this module loads Jinja
     from urdfkin.verify.oracles import versions  # noqa: PLC0415
 
     moment = started or datetime.now(UTC)
     frames = far_frames(found)
     written = question.within is not None and found.as_written is not None
     worst = found.as_written if written else frames[0] if frames and frames[0].q_a else None
-    return (
-        environment()
-        .get_template("same.html.j2")
-        .render(
-            found=found,
-            headline=headline(found, question),
-            good=found.holds(question),
-            narrowed=found.narrowed,
-            narrowed_head=NARROWED.capitalize(),
-            started=moment.isoformat(timespec="seconds"),
-            when=when(moment.isoformat(timespec="seconds")),
-            versions=versions(),
-            command=command_of(robots, question, options),
-            heads=HEADS,
-            farthest=farthest(found),
-            frames=rows(frames),
-            as_written=as_written(found),
-            renamed=renamed(found),
-            where=where(found, worst) if worst else "",
-            pictures=pictures(found, robots, worst, written=written),
-            title=f"Where {worst.frame} is {attained(worst)} off{' without changes of B' if written else ''}"
-            if worst and attained(worst)
-            else "Both robots in the zero configuration",
-            style=as_is(asset("report.css")),
-        )
+    return rendered(
+        "same.html.j2",
+        found=found,
+        headline=headline(found, question),
+        good=found.holds(question),
+        narrowed=found.narrowed,
+        narrowed_head=NARROWED.capitalize(),
+        started=moment.isoformat(timespec="seconds"),
+        when=when(moment.isoformat(timespec="seconds")),
+        versions=versions(),
+        command=command_of(robots, question, options),
+        heads=HEADS,
+        farthest=farthest(found),
+        frames=rows(frames),
+        as_written=as_written(found),
+        renamed=renamed(found),
+        where=where(found, worst) if worst else "",
+        pictures=pictures(found, robots, worst, written=written),
+        title=f"Where {worst.frame} is {attained(worst)} off{' without changes of B' if written else ''}"
+        if worst and attained(worst)
+        else "Both robots in the zero configuration",
     )
 
 
 def command_of(robots: tuple[Robot, Robot], question: Question, options: Sequence[str]) -> str:
-    """Return the command line that repeats the comparison."""
     words = [robot.origin.words for robot in robots]
     words += [] if question.within is None else [f"--within {question.within!r}"]
     words += ["--strict"] if question.strict else []
@@ -410,15 +377,9 @@ def pictures(
 ) -> list[dict[str, Any]]:
     """Draw the skeletons of the two robots in two views, and an enlarged picture of the worst frame.
 
-    Args:
-        found: The result of `same`.
-        robots: A and B.
-        worst: The worst frame with its configurations. If this is None, the zero configuration is drawn.
-        written: Whether to draw B as written, not with the changes that make it equivalent to A.
-
-    Returns:
-        For each view: its title, its scale bar, and three groups of lines (x, y, x, y). The groups are the
-        lines of A, the lines of B, and the lines that connect A with B.
+    If `worst` is None, the zero configuration is drawn. If `written`, B is drawn without the changes that
+    make it equivalent to A. The result has for each view its title, its scale bar, and three groups of lines
+    (x, y, x, y): the lines of A, the lines of B, and the lines that connect A with B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -458,10 +419,7 @@ def _axes(T: FloatArray, size: float) -> FloatArray:
 def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
-    """Return one view.
-
-    The lines are projected along the viewing direction, and scaled to the size of the picture.
-    """
+    """Project the lines along the direction of view, and scale them to the size of the picture."""
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
     # The first row is the direction in space that points right on the page; the second row points down.
     seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
@@ -472,14 +430,7 @@ def _draw(
     placed = [np.round((x - (low + high) / 2.0) * scale, 1).reshape(-1, 4).tolist() for x in flat]
     ruler = round_length(2.0 * HALF * SCALE / scale)
     bar = {"x": -HALF * FILLED, "y": HALF - FOOT, "width": round(ruler * scale, 1), "words": length(ruler)}
-    return {
-        "title": title,
-        "a": placed[0],
-        "b": placed[1],
-        "gap": placed[2],
-        "half": HALF,
-        "scale": bar,
-    }
+    return {"title": title, "a": placed[0], "b": placed[1], "gap": placed[2], "half": HALF, "scale": bar}
 
 
 def round_length(most: float) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from urdfkin.errors.display import Table
-from urdfkin.report.listing import print_named, print_table
+from urdfkin.report.listing import print_table
 from urdfkin.report.words import (
     SIDES,
     check_name,
@@ -34,22 +34,19 @@ from urdfkin.report.words import (
     worst,
     worst_of,
 )
-from urdfkin.validation.document import Check, Document, Judgement, Robot, outcome_of
+from urdfkin.validation.document import Document, Judgement, Robot, outcome_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: Minimum width of a terminal for a table with a column for each quantity.
+#: A terminal of this width shows a table with a column for each quantity.
 _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
-    """Print a report.
+    """Print a report; the width of the console determines the layout.
 
-    Args:
-        document: The report's data.
-        out: The console. Its width determines the layout.
-        cases: Whether to show the command that computes each worst case again. Failures always show it.
+    With `cases`, the command that computes each worst case again is shown. Failures always show it.
     """
     robots = document["robots"]
     out.print(
@@ -86,16 +83,16 @@ def _counts(robot: Robot) -> list[str]:
 def _print_wide(robots: Sequence[Robot], out: Console) -> None:
     quantities_of = columns(robots)
     heads = ["robot", "joints", "frames", "results", *quantities_of, "verdict"]
-    rows = (
+    rows = [
         [*_counts(robot), *(worst_of(robot, names) for names in quantities_of.values()), robot["verdict"]]
         for robot in robots
-    )
-    print_named(out, heads, rows, left=(0, len(heads) - 1))
+    ]
+    print_table(out, Table(heads, rows, left=(0, len(heads) - 1)))
 
 
 def _print_robots(robots: Sequence[Robot], out: Console) -> None:
     heads = ["robot", "joints", "frames", "results", "worst", "of bound", "verdict"]
-    rows = (
+    rows = [
         [
             *_counts(robot),
             units(worst(check["worst"] for check in robot["checks"]), compared=bool(robot["checks"])),
@@ -103,12 +100,11 @@ def _print_robots(robots: Sequence[Robot], out: Console) -> None:
             robot["verdict"],
         ]
         for robot in robots
-    )
-    print_named(out, heads, rows, left=(0, 6))
+    ]
+    print_table(out, Table(heads, rows, left=(0, 6)))
 
 
 def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
-    """Print one row for each quantity, over all robots."""
     rows = []
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name)]
@@ -118,29 +114,21 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
             for robot in robots
             if any(check["worst"] == largest for check in of_quantity(robot, name))
         )
-        rows.append([quantity_name(name), *_figures(checks), where])
-    print_named(out, ["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4))
+        results = f"{sum(check['results'] for check in checks):,}"
+        share = percent(worst(check["share_of_bound"] for check in checks))
+        rows.append([quantity_name(name), results, units(largest), share, where])
+    print_table(out, Table(["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4)))
 
 
 def _three_sides(robots: Sequence[Robot], title: str) -> Table:
-    """Return one row for each quantity, over all robots and reference frames."""
-    rows = ([quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title))
+    rows = [[quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title)]
     heads = [head.replace(", ", ",\n") for head in second_oracle_heads(title)]
-    return Table(["quantity", *heads], list(rows), left=(0, 5))
-
-
-def _figures(checks: Sequence[Check]) -> list[str]:
-    return [
-        f"{sum(check['results'] for check in checks):,}",
-        units(worst(check["worst"] for check in checks)),
-        percent(worst(check["share_of_bound"] for check in checks)),
-    ]
+    return Table(["quantity", *heads], rows, left=(0, 5))
 
 
 def _print_checks(robot: Robot, out: Console) -> None:
-    """Print the checks of one robot: a row for each quantity and reference frame."""
     heads = ["quantity, reference", "results", "outside", "median", "99 %", "worst", "of bound"]
-    rows = (
+    rows = [
         [
             check_name(check),
             f"{check['results']:,}",
@@ -151,25 +139,16 @@ def _print_checks(robot: Robot, out: Console) -> None:
             percent(check["share_of_bound"]),
         ]
         for check in in_order(robot)
-    )
+    ]
     out.print(robot["source"], style="bold")
-    print_named(out, heads, rows)
+    print_table(out, Table(heads, rows))
 
 
 def _judged(judgement: Judgement) -> Table:
-    """Return the errors of urdfkin and Pinocchio in the accuracy study.
-
-    The table has a row for each quantity and reference frame.
-    """
-    heads = [
-        "quantity, reference",
-        "numbers",
-        "worst\nurdfkin",
-        "\nPinocchio",
-        "typical\nurdfkin",
-        "\nPinocchio",
-    ]
-    rows = (
+    """Return the errors of the accuracy study, with a row for each quantity and reference frame."""
+    heads = ["quantity, reference", "numbers", "worst\nurdfkin", "\nPinocchio"]
+    heads += ["typical\nurdfkin", "\nPinocchio", "smaller\nerror"]
+    rows = [
         [
             line["quantity"] + (f", {line['reference']}" if line["reference"] else ""),
             f"{line['numbers']:,}",
@@ -178,8 +157,8 @@ def _judged(judgement: Judgement) -> Table:
             nearer(line),
         ]
         for line in judgement["lines"]
-    )
-    return Table([*heads, "smaller\nerror"], list(rows))
+    ]
+    return Table(heads, rows)
 
 
 def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:

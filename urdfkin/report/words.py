@@ -12,12 +12,11 @@ from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES
 
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
-#: The verdicts, worse ones first.
+#: Verdicts, worse ones first
 VERDICTS = tuple(verdict.value for verdict in Verdict)
 
 
 def quantity_name(quantity: str) -> str:
-    """Return the displayed name of a quantity."""
     return QUANTITIES[quantity].title if quantity in QUANTITIES else quantity
 
 
@@ -30,7 +29,7 @@ def check_name(check: Check) -> str:
 def second_reader_words(robot: Robot) -> str:
     """Return in words whether yourdfpy, the second reader, reads the same tree as urdfkin.
 
-    Return an empty text if there was no comparison.
+    The text is empty if there was no comparison.
     """
     reading = robot.get("second_reader")
     if reading is None:
@@ -47,10 +46,7 @@ def second_reader_words(robot: Robot) -> str:
 
 
 def units(value: Units, *, compared: bool = True) -> str:
-    """Format a disagreement.
-
-    The input None is shown as `inf` (infinity). If nothing was compared, the text is empty.
-    """
+    """Format a disagreement; None is infinity, and the text is empty if nothing was compared."""
     if not compared:
         return ""
     if value is None:
@@ -59,10 +55,7 @@ def units(value: Units, *, compared: bool = True) -> str:
 
 
 def percent(share: Units) -> str:
-    """Format the ratio of a disagreement to its bound.
-
-    A ratio below 10 is shown as a percentage, a larger one as a factor.
-    """
+    """Format the ratio of a disagreement to its bound: as a percentage below 10, otherwise as a factor."""
     if share is None:
         return "inf"
     return f"{share:.1%}" if share < 10.0 else f"{share:.2g} x"
@@ -79,29 +72,21 @@ def worst(values: Iterable[Units]) -> Units:
 
 
 def quantities(robots: Sequence[Robot]) -> list[str]:
-    """Return the compared quantities of all robots.
-
-    Quantities that this version knows come first, in their usual order.
-    """
+    """Return the compared quantities of all robots; known quantities come first, in their usual order."""
     found = {check["quantity"] for robot in robots for check in robot["checks"]}
     return [q for q in QUANTITIES if q in found] + sorted(found - set(QUANTITIES))
 
 
 def of_quantity(robot: Robot, quantity: str) -> list[Check]:
-    """Return a robot's checks of one quantity: one check for each reference frame."""
     return [check for check in robot["checks"] if check["quantity"] == quantity]
 
 
 def in_order(robot: Robot) -> list[Check]:
-    """Return a robot's checks, sorted by quantity."""
-    return [check for quantity in quantities([robot]) for check in of_quantity(robot, quantity)]
+    return column(robot, quantities([robot]))
 
 
 def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
-    """Return the columns of the table of robots: the heading and its quantities.
-
-    An unknown quantity has its own column.
-    """
+    """Return each heading of the table of robots with its quantities; an unknown one has its own heading."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].head if name in QUANTITIES else name
@@ -110,7 +95,6 @@ def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
 
 
 def column(robot: Robot, names: Sequence[str]) -> list[Check]:
-    """Return a robot's checks of several quantities."""
     return [check for name in names for check in of_quantity(robot, name)]
 
 
@@ -121,17 +105,12 @@ def worst_of(robot: Robot, names: Sequence[str]) -> str:
 
 
 def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
-    """Return the library with the smaller typical error, or "equal" if both errors are the same number."""
     ours, theirs = line["urdfkin"]["typical"], line["pinocchio"]["typical"]
     return "equal" if ours == theirs else "urdfkin" if ours < theirs else "Pinocchio"
 
 
 def nearer_counts(lines: Sequence[Judged]) -> str:
-    """Return text that compares the errors of urdfkin and Pinocchio in the accuracy study.
-
-    The text contains three counts of lines of the study: urdfkin's typical error is smaller than Pinocchio's,
-    equal, or larger.
-    """
+    """Return in words how often urdfkin's typical error is smaller than Pinocchio's, equal, or larger."""
     counts = Counter(nearer(line) for line in lines)
     return (
         f"urdfkin is more accurate in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
@@ -140,17 +119,12 @@ def nearer_counts(lines: Sequence[Judged]) -> str:
 
 
 def judged_on(judgement: Judgement) -> str:
-    """Return a text about the result of the accuracy study.
-
-    The text states the number of samples and whether the base moved. It also contains the text of
-    `nearer_counts`.
-    """
+    """Return in words the samples, the motion of the base, and the result of the accuracy study."""
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
 
 
 def second_oracle_title(robots: Sequence[Robot]) -> str | None:
-    """Return the displayed name of the second oracle; None if there was none."""
     names = (
         check["second_oracle"]["by"]
         for robot in robots
@@ -162,15 +136,11 @@ def second_oracle_title(robots: Sequence[Robot]) -> str | None:
 
 
 def second_oracle_heads(title: str) -> list[str]:
-    """Return the headings for a second oracle: three pairs of libraries, and the library that disagrees."""
     return ["results", "urdfkin, Pinocchio", f"urdfkin, {title}", f"Pinocchio, {title}", "outlier"]
 
 
 def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, list[str]]]:
-    """Yield each quantity with its cells for the columns of `second_oracle_heads`.
-
-    A cell covers all robots.
-    """
+    """Yield each quantity with its cells for `second_oracle_heads`, over all robots."""
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name) if "second_oracle" in check]
         if checks:
@@ -208,7 +178,6 @@ def share_of(robot: Robot) -> Units:
 
 
 def summary(document: Document) -> str:
-    """Return the outcome in one line."""
     robots = document["robots"]
     results = sum(robot["results"] for robot in robots)
     failed = sum(robot["failed"] for robot in robots)
@@ -233,5 +202,4 @@ def verdict_counts(document: Document) -> dict[str, int]:
 
 
 def pinocchio(document: Document) -> str:
-    """Return the version of Pinocchio."""
     return document["versions"].get("pin", "?")

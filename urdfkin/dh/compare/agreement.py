@@ -39,25 +39,24 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
 
-#: Default tolerance for the tip's position (metres). If one or two cells of a table are rounded to 0.1 mm,
-#: the tip error is two thirds of this tolerance.
+#: This is the default tolerance for the tip's position (metres).
+#: The tip error is two thirds of this tolerance if one or two cells are rounded to 0.1 mm.
 TOLERANCE = 2e-4
-#: Number of configurations for a fit, and number of other configurations for the check of the fit.
+#: The fit uses `FIT_SAMPLES` configurations, and its check uses `CHECK_SAMPLES` other configurations.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
 #: Differing cells are reported if their correction reduces the tip error to at most this fraction.
 _EXPLAINS = 0.5
-#: Largest fraction of the tip error that may remain after the correction of a single mistake.
+#: At most this fraction of the tip error may remain after the correction of a single mistake.
 _LEFT = 0.05
-#: Smallest change of a cell that is reported, relative to the reach. It is a tenth of `EXPLAINED`.
+#: Smaller changes of a cell, relative to the reach, are not reported (a tenth of `EXPLAINED`).
 _MOVED = 1e-10
-#: A tip that moves by less than this fraction of the path length is treated as fixed. For such a tip, the
-#: reach is the length of the path.
+#: A tip that moves by less than this fraction of the path length is treated as fixed.
+#: For such a tip, the reach is the length of the path.
 _FIXED_TIP = 1e-6
-#: Range in which a prismatic joint without limits is sampled (metres).
+#: A prismatic joint without limits is sampled in this range (metres).
 _SLIDE = (-0.5, 0.5)
-#: For each row of a table: the rounding error of each cell (metres or radians). The rounding error is half a
-#: unit of the last digit in the file.
+#: The rounding error (metres or radians) of each cell of each row is half a unit of its last digit.
 Digits = Sequence[Mapping[str, float]]
 
 
@@ -80,9 +79,6 @@ def compare(
             is written.
         digits: Precision of each cell in the table's file (`urdfkin.dh.rows.last_digits`).
 
-    Returns:
-        The comparison. The comparison contains the cells that differ, or the likely mistakes.
-
     Raises:
         InputError: the joints of the table differ in number or kind from those of the path.
     """
@@ -92,7 +88,9 @@ def compare(
     written = as_written(standard)
     fitted = fitted_model(chain, standard, written, tried) if fit else written
     complete = fit_cells(fitted, tried, _cells_of(reference), free=fit)
-    off, residual = _off(fitted, written, judged), judged.apart(complete)[0]
+    metres, radians = judged.apart(fitted)
+    written_metres, written_radians = judged.apart(written)
+    residual = judged.apart(complete)[0]
     cells = _differences(chain, reference, fitted, complete, judged, digits, fit)
     table = _fitted_table(chain, standard, fitted)
     most_metres, most_radians = max_tip_error_bound(chain, table, _slides(chain))
@@ -104,7 +102,7 @@ def compare(
         offsets=_offsets(standard, fitted),
         base=_absorbed_offset(written.base, fitted.base),
         tool=_absorbed_offset(written.tool, fitted.tool),
-        differences=cells if residual <= max(_EXPLAINS * off["metres"], EXPLAINED * tried.scale) else (),
+        differences=cells if residual <= max(_EXPLAINS * metres, EXPLAINED * tried.scale) else (),
         instead=(),
         hidden=_hidden(reference, fitted, judged) if fit else (),
         mistakes=(),
@@ -113,7 +111,10 @@ def compare(
         samples=CHECK_SAMPLES,
         most_metres=most_metres,
         most_radians=most_radians,
-        **off,
+        metres=metres,
+        radians=radians,
+        written_metres=written_metres,
+        written_radians=written_radians,
     )
     if found.as_written:
         return found
@@ -131,15 +132,8 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
 
     To be fast, the fit tries only a few combinations of joint signs and directions of x. If two axes nearly
-    coincide, the fit does not try large opposite changes of their two joint offsets.
-
-    Args:
-        chain: The path.
-        reference: The table.
-        enough: Tip error at which the fit stops (metres).
-
-    Raises:
-        InputError: the joints of the table differ in number or kind from those of the path.
+    coincide, the fit does not try large opposite changes of their two joint offsets. The fit stops at the tip
+    error `enough` (metres). If the joints differ in number or kind, InputError is raised.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, Convention.STANDARD)
@@ -147,18 +141,11 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     return judged.apart(fitted_model(chain, standard, as_written(standard), tried, enough, hasty=True))
 
 
-def _off(fitted: Model, written: Model, judged: TargetPoses) -> dict[str, float]:
-    """Return the tip errors of the fitted table and of the table as it is written."""
-    names = ("metres", "radians", "written_metres", "written_radians")
-    return dict(zip(names, (*judged.apart(fitted), *judged.apart(written)), strict=True))
-
-
 def _reach(chain: FrameChain, wanted: FloatArray) -> float:
-    """Return the robot's reach, which converts radians to metres.
+    """Return the robot's reach, which converts radians to metres: the spread of the tip's positions.
 
     A URDF made from a table without Hayati rows may contain an offset of kilometres, and a second offset that
-    compensates it. The path length along the links is then far larger than the reach. The reach is therefore
-    the spread of the tip's positions.
+    compensates it. The path length along the links is then far larger than the reach.
     """
     tips = wanted[:, :3, 3]
     across = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -202,16 +189,14 @@ def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, Floa
 
 
 def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
-    """Return the ranges of the prismatic joints (metres)."""
-    return {joint.name: _slide(joint.limit) for joint in chain.joints if not joint.kind.turns}
-
-
-def _slide(limit: Limit | None) -> tuple[float, float]:
-    return (limit.lower, limit.upper) if is_bounded(limit) and limit.lower < limit.upper else _SLIDE
+    limits = {joint.name: joint.limit for joint in chain.joints if not joint.kind.turns}
+    return {
+        name: (limit.lower, limit.upper) if is_bounded(limit) and limit.lower < limit.upper else _SLIDE
+        for name, limit in limits.items()
+    }
 
 
 def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:
-    """Return the fitted offset of each joint's variable."""
     offsets = []
     for i, row in enumerate(standard.rows):
         k = fitted.own(i)
@@ -226,12 +211,10 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 
 
 def _cell_at(reference: DHTable, i: int, cell: str) -> int:
-    """Return the index of the row that contains a cell in the reference table.
+    """Return the index of the row that contains a cell of the standard row i in the reference table.
 
-    In a standard table, row i contains the cell.
-
-    In a modified table, the cells a, alpha and beta of the standard row i are in row i + 1. If no row
-    contains the cell, the result is the number of rows.
+    In a modified table, a, alpha and beta are in row i + 1. If no row contains the cell, the result is the
+    number of rows.
     """
     return i + (reference.convention is Convention.MODIFIED and cell not in ("theta", "d"))
 
@@ -305,21 +288,12 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTabl
     """Return the fitted reference table, with the joint names and limits of the URDF."""
     rows = []
     for i, (row, joint) in enumerate(zip(standard.rows, chain.joints, strict=True)):
-        rows.append(
-            replace(
-                row,
-                theta=float(fitted.cells[i, 0]),
-                d=float(fitted.cells[i, 1]),
-                sense=int(fitted.senses[i]),
-                joint=joint.name,
-                kind=joint.kind if joint.kind is not JointKind.FIXED else row.kind,
-                mimic=joint.mimic,
-                limit=joint.limit,
-            )
-        )
-    return DHTable(
-        Convention.STANDARD, tuple(rows), fitted.base, fitted.tool, chain.robot, chain.base, chain.tip
-    )
+        theta, d = fitted.cells[i, :2].tolist()
+        of_joint = {name: getattr(joint, name) for name in ("kind", "mimic", "limit")}
+        sense = int(fitted.senses[i])
+        rows.append(replace(row, theta=theta, d=d, sense=sense, joint=joint.name, **of_joint))
+    ends = fitted.base, fitted.tool, chain.robot, chain.base, chain.tip
+    return DHTable(Convention.STANDARD, tuple(rows), *ends)
 
 
 def max_tip_error_bound(
@@ -327,11 +301,8 @@ def max_tip_error_bound(
 ) -> tuple[float, float]:
     """Return an upper bound of a table's tip error (metres, radians); rounding errors are not included.
 
-    Args:
-        path: The path; its mimic rules are ignored.
-        table: The table, with the path's joint values as variables. The table's rows contain the joint signs
-            and joint offsets.
-        slides: Ranges of the prismatic joints (metres).
+    The mimic rules of the path are ignored. The variables of the table are the path's joint values, and its
+    rows contain the joint signs and joint offsets. `slides` are the ranges of the prismatic joints (metres).
     """
     mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))
     found = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)

@@ -42,29 +42,29 @@ from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.path import Motion, Path
 from urdfkin.model.tree import FloatArray, pose
 
-#: Names of the cells in the order of their transforms in a row. `_ROW` contains these transforms.
+#: The cells have the order of their transforms in a row, which `_ROW` contains.
 CELLS = ("theta", "d", "a", "alpha", "beta")
 _ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
-#: Largest step of the fit, in radians for angles, and in metres per metre of reach for lengths.
+#: The step of the fit is limited, in radians for angles, and in metres per metre of reach for lengths.
 LONGEST_STEP = 0.5
-#: The fit of the cells ends after `_ROUNDS` steps. A step is an improvement if it reduces the error by more
-#: than the fraction `_BETTER`. A mean error of at most `_SOLVED`, relative to the reach, is treated as zero.
+#: The fit of the cells ends after `_ROUNDS` steps.
+#: A step is an improvement if it reduces the error by more than the fraction `_BETTER`.
+#: A mean error of at most `_SOLVED`, relative to the reach, is treated as zero.
 _ROUNDS, _BETTER, _SOLVED = 40, 1e-9, 1e-14
-#: A singular value is treated as zero if it is below this fraction of the largest singular value. The
-#: fraction is `_FREE` in the fit of the free parameters, and `_CELLS` in the fit of the cells.
+#: A singular value is treated as zero if it is below this fraction of the largest singular value.
+#: `_FREE` is for the fit of the free parameters, and `_CELLS` is for the fit of the cells.
 _FREE, _CELLS = 1e-8, 1e-9
-#: Number of iterations; each iteration computes new weights of the cells. The smallest weight is the fraction
-#: `_STAYS` of the reach.
+#: Each of `_SPARSER` iterations computes new weights of the cells.
+#: The smallest weight is the fraction `_STAYS` of the reach.
 _SPARSER, _STAYS = 25, 1e-9
-#: Weight of the last cell relative to the first cell. The weights increase from the first cell to the last
-#: cell. Therefore, if two cells have the same effect on the tip, the solution changes only one of these two
-#: cells.
+#: The weights of the cells increase from 1 for the first cell to this number for the last cell.
+#: If two cells have the same effect on the tip, the solution then changes only one of them.
 _LAST_WINS = 1.2
-#: Initial weight of beta, and the factor by which each iteration multiplies this weight.
+#: The weight of beta begins with `_BETA`, and each iteration multiplies it by `_BETA_AGAIN`.
 #: With a small weight, beta changes only if a change of alpha is not enough.
 _BETA, _BETA_AGAIN = 0.3, 0.5
-#: A cell cannot be determined if a change of free parameters has the same effect on the tip. The two effects
-#: are treated as equal if they differ by at most this fraction.
+#: A cell cannot be determined if a change of free parameters has the same effect on the tip.
+#: The two effects are treated as equal if they differ by at most this fraction.
 _HIDDEN = 1e-6
 
 
@@ -120,7 +120,6 @@ class Model:
         return Path((self.base, *self._motions, self.tool)), amounts
 
     def poses(self, values: FloatArray) -> FloatArray:
-        """Return the (s, 4, 4) poses of the tip."""
         path, amounts = self.path_at(values)
         return path.poses(amounts)
 
@@ -132,7 +131,7 @@ class TargetPoses:
     Attributes:
         values: (s, n) joint values of the URDF in s samples.
         poses: (s, 4, 4) poses of the URDF's tip at these values.
-        scale: Length that converts radians to metres.
+        scale: Length (metres) that converts radians to metres.
     """
 
     values: FloatArray
@@ -146,10 +145,7 @@ class TargetPoses:
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return the twists (6 s,) that lead from a model's poses to the target poses.
-
-        The angular parts of the twists are multiplied by `scale`.
-        """
+        """Return the twists (6 s,) from a model's poses to the target poses, with angles times `scale`."""
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
@@ -160,17 +156,14 @@ def columns(
     """Return the tip's poses, and their derivatives by the free parameters and by the cells, as twists.
 
     Each of the two arrays of derivatives has six rows for each sample, and a column for each parameter or
-    cell. The column contains the derivative of the tip's poses with respect to this parameter or cell.
-
-    The free parameters are six numbers of the base, six of the tool, and the variable of each row. The cells
-    are in row order: five cells of row 1, five cells of row 2, and so on. Angles are multiplied by the scale.
-    `frames` contains the poses of all frames of the model at all samples. If `frames` is None, the function
-    computes these poses.
+    cell. The free parameters are six numbers of the base, six of the tool, and the variable of each row. The
+    cells are in row order: five cells of row 1, five cells of row 2, and so on. Angles are multiplied by the
+    scale. `frames` are the poses of all frames of the model at all samples, which are computed if None.
     """
     scale = wanted.scale
     path, amounts = model.path_at(wanted.values)
     poses, twists = path.columns_at(path.frames(amounts) if frames is None else frames)
-    # Changes of angles, and the angular parts of twists, are multiplied by `scale` and are then in metres.
+    # Changes of angles, and the angular parts of twists, are in metres after the factor `scale`.
     n, turning = len(model.cells), np.tile([motion.turns for motion in _ROW], len(model.cells))
     twists = twists * np.where(turning, 1.0 / scale, 1.0)
     twists[:, 3:] *= scale
@@ -198,11 +191,8 @@ def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
 def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: bool) -> Model:
     """Fit the table to the URDF with the fewest and smallest changes of cells.
 
-    Args:
-        model: The table.
-        wanted: Target poses from the URDF.
-        cells_of: (n, 5) mask of the cells: 1 for cells that may change, 0 for all other cells.
-        free: Whether base, tool and joint offsets may change too.
+    `cells_of` is an (n, 5) mask: 1 for cells that may change, 0 for all other cells. With `free`, base, tool
+    and joint offsets may change too.
     """
     start, best, best_size, scale = model, model, np.inf, wanted.scale
     for _ in range(_ROUNDS):
@@ -278,16 +268,16 @@ def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | Non
     for i, own in enumerate(free[12:]):
         k = model.own(i)
         cells[i, k] += own * per_cell[k]
-    # The change of the base is expressed in the frame of the first revolute joint. The change of the tool is
-    # expressed in the frame of the last revolute joint. A rotation of base or tool about this joint's axis
-    # then exactly equals a change of the joint's offset.
+    # The change of the base is expressed in the frame of the first revolute joint.
+    # The change of the tool is expressed in the frame of the last revolute joint.
+    # A rotation about the axis of this joint then exactly equals a change of the joint's offset.
     base = _apply_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _apply_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
 
 
 def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
-    """Return the pose T after a small translation and rotation, which are expressed in the frame of T."""
+    """Return T after a small translation and rotation, which are expressed in the frame of T."""
     return T @ pose(exp_rotation(twist[3:] / scale), twist[:3])
 
 
@@ -295,19 +285,17 @@ def _apply_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 _PATIENCE = 4
 #: A fit ends at this mean error, relative to the reach.
 _ROUNDING = 1e-13
-#: Arguments `count` and `beam` of `align` for a fast fit.
+#: A fast fit calls `align` with these arguments `count` and `beam`.
 HASTY = (3, 16)
-#: The search ends when the tip error is at most this fraction of the reach, because such an error is only
-#: rounding.
+#: The search ends at this tip error, relative to the reach, because such an error is only rounding.
 _AT_ROUNDING = 1e-12
-#: Other joint signs than in the file are used only if they reduce the tip error to less than this fraction.
+#: Other joint signs than in the file are used only if the tip error falls below this fraction.
 _TWICE_AS_GOOD = 0.5
-#: Angles (rad) that the fit adds to a joint offset and subtracts from the next joint offset.
+#: The fit adds one of these angles (rad) to a joint offset, and subtracts it from the next joint offset.
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
 def as_written(standard: DHTable) -> Model:
-    """Return the table as it is written, with the URDF's joint values as its variables."""
     return Model(
         np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
         np.array([float(row.kind.turns) for row in standard.rows]),
@@ -377,26 +365,17 @@ def starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -
 
 
 def _start(standard: DHTable, aligned: Alignment) -> Model:
-    """Return the reference table with the joint signs, joint offsets, base and tool of an alignment."""
-    start = replace(
-        as_written(standard),
-        senses=np.array(aligned.senses, dtype=np.float64),
-        base=aligned.base,
-        tool=aligned.tool,
-    )
+    senses = np.array(aligned.senses, dtype=np.float64)
+    start = replace(as_written(standard), senses=senses, base=aligned.base, tool=aligned.tool)
     for i, offset in enumerate(aligned.offsets):
         start.cells[i, start.own(i)] += offset
     return start
 
 
 def fit_freedoms(model: Model, wanted: TargetPoses, *, turns: bool, ends: bool = False) -> Model:
-    """Fit base, tool and offsets.
+    """Fit base, tool and offsets, or with `ends` only base and tool.
 
-    Args:
-        model: The start.
-        wanted: Target poses from the URDF.
-        turns: Whether to call `_opposite_rotations` when the error no longer decreases.
-        ends: Whether to fit only base and tool.
+    With `turns`, `_opposite_rotations` is called when the error no longer decreases.
     """
     for _ in range(2 * len(model.cells)):
         model, size = _descend(model, wanted, ends)
@@ -448,20 +427,18 @@ def _opposite_rotations(model: Model) -> list[Model]:
     return found
 
 
-#: Number of sign combinations that `align` returns, and number of sign combinations that it keeps at each
-#: joint.
+#: `align` returns `PATTERNS` combinations of signs, and keeps `BEAM` combinations at each joint.
 PATTERNS, BEAM = 12, 128
-#: Number (metres) that the search adds to the cost of a combination for each reversed joint. Among equally
-#: good combinations, the search therefore selects the joint signs of the URDF.
+#: Each reversed joint adds this number (metres) to the cost of a combination.
+#: Among equally good combinations, the search therefore selects the joint signs of the URDF.
 REVERSAL = 1e-9
-#: A prismatic axis can be shifted freely. Differences of lengths next to such an axis are therefore
-#: multiplied by this small weight.
+#: A prismatic axis can be shifted freely.
+#: Differences of lengths next to such an axis are therefore multiplied by this small weight.
 _SLIDING = 1e-3
-#: Parallel axes with a smaller distance (metres) are treated as coinciding. The direction of x can then be
-#: chosen.
+#: Parallel axes with a smaller distance (metres) are treated as coinciding.
+#: The direction of x can then be chosen.
 _NO_OFFSET = 1e-5
-#: Two candidates are equal if their numbers (metres, radians) agree after rounding to this number of
-#: decimals.
+#: Numbers (metres, radians) of equal candidates agree after rounding to this number of decimals.
 _ALIKE = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -525,7 +502,7 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
     """
     reach = max(chain.reach, reference.span, LEAST_SIZE)
     n = len(reference.rows)
-    partials = [_first(sense) for sense in (1, -1)]
+    partials = [_Partial(REVERSAL * (sense < 0), (sense,), (), 0.0, 0.0, np.eye(4)) for sense in (1, -1)]
     for i in range(n - 1):
         longer = [
             extended
@@ -534,9 +511,9 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
-    # If axes nearly coincide, many directions of x are nearly equivalent. A fit that starts from one of these
-    # directions can reach all of them. Therefore, only the best candidate is kept for each combination of
-    # joint signs.
+    # If axes nearly coincide, many directions of x are nearly equivalent.
+    # A fit that starts from one of these directions can reach all of them.
+    # Therefore, only the best candidate is kept for each combination of joint signs.
     by_senses: dict[tuple[int, ...], _Partial] = {}
     for partial in partials:
         by_senses.setdefault(partial.senses, partial)
@@ -544,19 +521,12 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
     return [_close_chain(partial, chain, reference) for partial in best]
 
 
-def _first(sense: int) -> _Partial:
-    return _Partial(REVERSAL * (sense < 0), (sense,), (), 0.0, 0.0, np.eye(4))
-
-
 def _without_equivalents(partials: list[_Partial]) -> list[_Partial]:
-    """Keep only the first of several equivalent candidates.
-
-    Coinciding axes lead to many equivalent candidates.
-    """
+    """Keep only the first of several equivalent candidates, which coinciding axes lead to."""
     found: dict[tuple[object, ...], _Partial] = {}
     for one in partials:
-        # If `absorber` names a row, the joint offset of this row can reverse x. The two directions of x are
-        # then equivalent.
+        # If `absorber` names a row, the joint offset of this row can reverse x.
+        # The two directions of x are then equivalent.
         circle = math.pi if one.absorber else 2.0 * math.pi
         ahead = round(one.phi_in % circle, _ALIKE), round(one.carry, _ALIKE)
         found.setdefault((one.senses, one.absorber, *ahead), one)
@@ -590,19 +560,11 @@ def _extend(
             cost += reach * _apart(theta, row.theta)
         offset = math.remainder(theta - row.theta, 2.0 * math.pi) if turns[i] else d - row.d
         base = candidate.base
-        if i == 0:  # the first row's offset goes into the base
+        if i == 0:  # The base contains the first row's offset.
             base, offset = along_axis(step.phi - row.theta, step.delta - row.d), 0.0
-        found.append(
-            _Partial(
-                cost,
-                (*candidate.senses, sense),
-                (*candidate.offsets, offset),
-                step.phi_next,
-                step.delta_next,
-                base,
-                _absorber(candidate, step, i, turns[i]),
-            )
-        )
+        senses, offsets = (*candidate.senses, sense), (*candidate.offsets, offset)
+        absorber = _absorber(candidate, step, i, turns[i])
+        found.append(_Partial(cost, senses, offsets, step.phi_next, step.delta_next, base, absorber))
     return found
 
 
@@ -664,7 +626,6 @@ def _steps(
 
 
 def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
-    """Return the alignment of the whole chain, with its base and its tool."""
     n = len(reference.rows)
     last = reference.rows[-1]
     start = _pose(chain, 0, 1, best.senses[0]) @ best.base
@@ -676,5 +637,4 @@ def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Align
 
 
 def _apart(first: float, second: float) -> float:
-    """Return the angle between two directions, 0 to pi."""
     return abs(math.remainder(first - second, 2.0 * math.pi))

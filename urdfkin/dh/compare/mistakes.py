@@ -28,8 +28,8 @@ from urdfkin.model.tree import FloatArray, pose
 
 #: Two angles with a smaller difference (rad) are treated as equal.
 _SAME_ANGLE = 1e-9
-#: If there are more possible changes of the table than this number, joint offsets and joint signs are not
-#: fitted. A table of nine rows has about this number of possible changes.
+#: With more possible changes of the table, joint offsets and joint signs are not fitted.
+#: A table of nine rows has about this number of possible changes.
 _MOST_FITS = 100
 
 
@@ -48,7 +48,6 @@ class Search:
     """A search for a single mistake in the table of a path.
 
     Attributes:
-        chain: The path.
         tried: Samples of the path's tip poses, used in the fits.
         judged: Other samples of the path's tip poses, used to check the fits.
         tolerance: Tolerance at the tip (metres).
@@ -62,18 +61,14 @@ class Search:
     def mistakes(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
         """Return the changes of the table after which the fewest parameters must be fitted.
 
-        The result is empty if no change reduces the number of these parameters.
+        The result is empty if no change reduces the number of these parameters. With `fit`, base, tool, joint
+        offsets and joint signs may be fitted after a correction. `agrees` says whether the table agrees after
+        a fit of these parameters.
 
         Some tables agree only after a fit of base, tool and joint offsets. Such a table has a mistake, or its
         frames differ from the URDF's frames. The fit cannot distinguish these two cases. Therefore, a
         correction of such a table is reported only if the corrected table agrees after a fit of only the
         base, after a fit of only the tool, or without a fit.
-
-        Args:
-            reference: The table.
-            fit: Whether base, tool, joint offsets and joint signs may be fitted after a correction of the
-                table.
-            agrees: Whether the table agrees after a fit of base, tool, joint offsets and joint signs.
         """
         if self._agrees(_model(reference)):
             return ()
@@ -114,10 +109,7 @@ class Search:
         return model if self._agrees(model) else None
 
     def _with_one_end(self, table: DHTable) -> Model | None:
-        """Fit only the tool; if the table does not agree after this fit, fit only the base instead.
-
-        The result is None if the table disagrees after each of the two fits.
-        """
+        """Fit only the tool, or else only the base; return None if neither makes the table agree."""
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
         tool = replace(model, tool=_mean(model.tool @ np.linalg.inv(poses) @ wanted))
@@ -180,7 +172,6 @@ def _model(table: DHTable) -> Model:
 
 
 def _changes(reference: DHTable) -> Iterator[_Change]:
-    """Yield every table that differs from the reference by one mistake."""
     for i, row in enumerate(reference.rows):
         for cell in ("a", "alpha", "d", "theta"):
             value = getattr(row, cell)
@@ -188,7 +179,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
                 yield _Change(MistakeKind.SIGN, (i,), cell, _with_cell(reference, i, cell, -value))
         for turn in (-0.5 * math.pi, 0.5 * math.pi):
             value = math.remainder(row.alpha + turn, 2.0 * math.pi)
-            # a change to the opposite sign was already tried above
+            # The change to the opposite sign was already tried above.
             if abs(math.remainder(value + row.alpha, 2.0 * math.pi)) > _SAME_ANGLE:
                 table = _with_cell(reference, i, "alpha", value)
                 yield _Change(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)
@@ -197,7 +188,7 @@ def _changes(reference: DHTable) -> Iterator[_Change]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    if len(reference.rows) > 3:  # reversing three rows only exchanges the first and the last row
+    if len(reference.rows) > 3:  # Reversing three rows exchanges the first and the last.
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))
     for kind, places, rows in orders:
@@ -217,10 +208,7 @@ def _with_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
 
 
 def _mean(poses: FloatArray) -> FloatArray:
-    """Return the (4, 4) mean of nearly equal poses.
-
-    If the poses are not nearly equal, return the first pose.
-    """
+    """Return the (4, 4) mean of nearly equal poses; the first pose if they are not nearly equal."""
     middle = poses.mean(axis=0)
     R = polar_factor(middle[:3, :3])
     return pose(R, middle[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])

@@ -1,7 +1,4 @@
-"""Store the result of comparing a table with a URDF, and write the result as text.
-
-The result contains the tip error, the fitted parameters and the cells that differ.
-"""
+"""Store the result of comparing a table with a URDF, and write the result as text."""
 
 from __future__ import annotations
 
@@ -21,14 +18,14 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: If at most this error remains after a change of cells, these cells are the only difference between table
-#: and URDF. The unit is rad for angles, and metres per metre of reach for positions. The rounding errors of a
-#: fit are far smaller than this number. The last digits in data sheets are far larger.
+#: If at most this error remains after a change of cells, only these cells differ between table and URDF.
+#: The unit is rad for angles, and metres per metre of reach for positions.
+#: The rounding errors of a fit are far smaller, and the last digits in data sheets are far larger.
 EXPLAINED = 1e-9
-#: Fitted numbers are printed with this resolution, or with a coarser resolution. The unit is rad for angles,
-#: and metres per metre of reach for lengths.
+#: Fitted numbers are printed with this resolution, or with a coarser resolution.
+#: The unit is rad for angles, and metres per metre of reach for lengths.
 _FINEST = 1e-12
-#: Half a unit of the last digit, with a margin for the rounding of decimal numbers to doubles.
+#: A difference may exceed half a unit of the last digit by the rounding of decimals to doubles.
 _HALF = 1.0 + 1e-6
 
 
@@ -57,26 +54,22 @@ class CellDifference:
 
     @property
     def difference(self) -> float:
-        """The URDF's value minus the reference table's value, in metres or radians."""
         return self.urdf - self.reference
 
     @property
     def is_rounding(self) -> bool:
-        """Whether the difference is at most half a unit of the last digit in the table."""
         return abs(self.difference) <= self.last_digit * _HALF
 
 
 @dataclass(frozen=True, slots=True)
 class AbsorbedOffset:
-    """Distance (metres) and angle (radians) by which the fit moved a table's base or tool."""
+    """Distance and angle by which the fit moved a table's base or tool."""
 
     metres: float
     radians: float
 
 
 class MistakeKind(StrEnum):
-    """Kind of a mistake in a table."""
-
     SIGN = "sign"
     RIGHT_ANGLE = "right angle"
     EXCHANGED = "rows exchanged"
@@ -87,11 +80,7 @@ class MistakeKind(StrEnum):
 class Fitted:
     """Counts of the parameters that a fit must change so that a table agrees with the URDF.
 
-    Attributes:
-        base: Whether the base changes.
-        tool: Whether the tool changes.
-        zeros: Number of joints whose zero position the fit changes.
-        reversed: Number of joints whose positive direction the fit reverses.
+    `zeros` counts zero positions of joints, and `reversed` counts positive directions of joints.
     """
 
     base: bool = False
@@ -101,7 +90,6 @@ class Fitted:
 
     @property
     def count(self) -> int:
-        """The number of changed parameters: base, tool, zero positions and positive directions of joints."""
         return self.base + self.tool + self.zeros + self.reversed
 
     def __str__(self) -> str:
@@ -116,14 +104,11 @@ class Mistake:
     """A likely mistake in a table. After its correction, fewer parameters must be fitted.
 
     Attributes:
-        kind: Kind of the mistake.
         rows: Indices of the changed rows, from 0.
         cell: The changed cell; None if rows are exchanged.
         table: The table after the change.
         fitted: The parameters that must still be fitted after the change.
-        metres: Position error of the tip after the change, at the sample with the largest error (metres).
-        radians: Orientation error of the tip after the change, at the sample with the largest error
-            (radians).
+        metres, radians: Largest errors of the tip on the samples after the change.
     """
 
     kind: MistakeKind
@@ -148,18 +133,10 @@ class Comparison:
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
         offsets: Offset of each joint (radians or metres).
-        base: Distance and angle by which the fit moved the base.
-        tool: Distance and angle by which the fit moved the tool.
-        metres: Largest position error (metres) of the fitted table's tip in all sampled configurations.
-        radians: Largest orientation error (radians) of the fitted table's tip in all sampled configurations.
-        most_metres: Proven upper bound (metres) of the tip's position error for all joint values and the
-            fitted table. The bound does not include rounding errors (`urdfkin.dh.compare.agreement`).
-        most_radians: Proven upper bound (radians) of the tip's orientation error for all joint values and the
-            fitted table. The bound does not include rounding errors.
-        written_metres: Largest position error (metres) of the unfitted table's tip in all sampled
-            configurations.
-        written_radians: Largest orientation error (radians) of the unfitted table's tip in all sampled
-            configurations.
+        metres, radians: Largest errors of the fitted table's tip on the samples.
+        most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all joint
+            values. The bounds do not include rounding errors (`urdfkin.dh.compare.agreement`).
+        written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
@@ -207,7 +184,6 @@ class Comparison:
 
     @property
     def passes(self) -> bool:
-        """Whether the table agrees with the URDF and has no likely mistake."""
         return self.agrees and not self.mistakes
 
     @property
@@ -227,19 +203,15 @@ class Comparison:
 
 
 def resolution(share: float, radians: float) -> float:
-    """Return the power of ten to which fitted numbers are rounded for printing.
+    """Return the power of ten to which fitted numbers are rounded: at least twice the tip error.
 
-    It is the smallest power of ten that is at least twice the tip error.
-
-    Args:
-        share: Position error of the tip, metres per metre of reach.
-        radians: Orientation error of the tip.
+    `share` is the position error of the tip in metres per metre of reach, and `radians` its orientation
+    error.
     """
     return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
 
 
 def document(found: Comparison, units: Units) -> TextDocument:
-    """Return the comparison as a text with the verdict, the fitted parameters and the cells that differ."""
     title, *verdict = _verdict(found)
     parts: Parts = [*verdict, *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
     if found.residual > EXPLAINED * found.reach and not found.mistakes:
@@ -257,7 +229,6 @@ def document(found: Comparison, units: Units) -> TextDocument:
 
 
 def _fitted(found: Comparison, units: Units) -> Parts:
-    """Return the text about the variables, base and tool that the fit changed."""
     parts: Parts = []
     table, fine = found.reference, resolution(found.metres / found.reach, found.radians)
     moved = [
@@ -275,7 +246,6 @@ def _fitted(found: Comparison, units: Units) -> Parts:
 
 
 def _verdict(found: Comparison) -> list[str]:
-    """Return lines of text with the verdict about the fitted table and about the written table."""
     table = found.reference
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
@@ -293,7 +263,7 @@ def _verdict(found: Comparison) -> list[str]:
     ends = [
         f"{what} by {change.metres * 1e3:.3g} mm and {change.radians:.3g} rad"
         for what, change in (("the base", found.base), ("the tool", found.tool))
-        if _is_moved(change, found)
+        if change.metres > found.rounding * found.reach or change.radians > found.rounding
     ]
     zeros = sum(abs(offset) > fine for offset in found.offsets)
     if zeros:
@@ -325,7 +295,6 @@ def _off(metres: float, radians: float) -> str:
 
 
 def _proven(found: Comparison) -> str:
-    """Return the proven bound of the tip error as text."""
     if found.exact:
         return "rounding alone"
     if math.isinf(found.most_metres):
@@ -333,12 +302,7 @@ def _proven(found: Comparison) -> str:
     return f"{found.most_metres * 1e3:.3g} mm and {found.most_radians:.3g} rad"
 
 
-def _is_moved(change: AbsorbedOffset, found: Comparison) -> bool:
-    return change.metres > found.rounding * found.reach or change.radians > found.rounding
-
-
 def _mistakes(found: Comparison, units: Units) -> list[str]:
-    """Return lines of text with the likely mistakes."""
     first = found.mistakes[0]
     left = "without a fit" if not first.fitted.count else f"after a fit of only {first.fitted}"
     count = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
@@ -354,7 +318,6 @@ def _mistakes(found: Comparison, units: Units) -> list[str]:
 
 
 def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
-    """Describe in words the change of the table that corrects a likely mistake."""
     if mistake.cell is None:
         if mistake.kind is MistakeKind.REVERSED:
             return "the rows in reverse order"
@@ -369,7 +332,6 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
 
 
 def _cells(found: Comparison, units: Units) -> Parts:
-    """Return the text about the cells in `differences`, `hidden` and `instead`."""
     unit = f"({units.length_name}, {units.angle_name})"
     parts: Parts = []
     if found.differences:

@@ -1,20 +1,14 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
 An *interpretation* of a table consists of a convention, units and column names. In each interpretation, the
-numbers of a table describe a robot with a different *shape*. The shape of a robot consists of three kinds of
-numbers: the distances of consecutive axes, the angles between them, and the offsets along the axes. A change
-of joint signs, joint offsets, base or tool does not change the shape. The shape is fast to compute.
-Therefore, urdfkin first computes the shape for each interpretation, and compares it with the URDF's shape. It
-then fits only the few interpretations whose shapes are closest to the URDF's shape.
+numbers of a table describe a robot with a different *shape*: the distances of consecutive axes, the angles
+between them, and the offsets along the axes. A change of joint signs, joint offsets, base or tool does not
+change the shape. The shape is fast to compute. Therefore, urdfkin fits only the few interpretations whose
+shapes are closest to the URDF's shape.
 
-`other_readings` changes the convention, units or column names of the table's plain data (`urdfkin.dh.rows`).
-It then parses the data again. The parser rejects an interpretation with an impossible value, such as an angle
-of eighty turns.
-
-`doubts` needs no URDF. The function finds units that look wrong, and two columns that may be exchanged. The
-function uses two facts. First, most angles in the table of an arm are multiples of 30 degrees, and lengths
-hardly ever look like such angles. Second, the length of an arm is between some centimetres and some metres.
-If there is a URDF, `diagnose` decides by a fit.
+`doubts` needs no URDF. The function uses two facts. First, most angles in the table of an arm are multiples
+of 30 degrees, and lengths hardly ever look like such angles. Second, the length of an arm is between some
+centimetres and some metres. If there is a URDF, `diagnose` decides by a fit.
 """
 
 from __future__ import annotations
@@ -38,12 +32,12 @@ from urdfkin.errors import InputError, Question, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: `_TRIED` interpretations are fitted. Axes with a smaller tilt than `_PARALLEL` (rad) are treated as
-#: parallel. `_WORTH` is the relative cost of each difference between an interpretation and the file, for
-#: example another unit.
+#: `_TRIED` interpretations are fitted.
+#: Axes with a smaller tilt than `_PARALLEL` (rad) are treated as parallel.
+#: `_WORTH` is the relative cost of each difference from the file, for example another unit.
 _TRIED, _PARALLEL, _WORTH = 3, 2e-2, 0.1
-#: An interpretation is returned only if its tip error is within the tolerance, or is at most this fraction of
-#: the original tip error and of the reach.
+#: An interpretation is returned if its tip error is within the tolerance, or at most this fraction.
+#: The fraction refers to the original tip error and to the reach.
 _EXPLAINS = 0.05
 
 
@@ -54,9 +48,7 @@ class CommonMistake:
     Attributes:
         reading: The interpretation with which the table agrees with the URDF.
         said: The interpretation that the table's file states.
-        metres: Largest position error of the tip in the sampled configurations, after a fit of base, tool and
-            offsets.
-        radians: Largest orientation error of the tip in the sampled configurations, after this fit.
+        metres, radians: Largest errors of the tip on the samples, after a fit of base, tool and offsets.
     """
 
     reading: ConventionHypothesis
@@ -72,7 +64,6 @@ class CommonMistake:
         )
 
     def as_mapping(self) -> dict[str, Any]:
-        """Return plain data."""
         return {
             "convention": str(self.reading.convention),
             "lengths": str(self.reading.lengths),
@@ -88,18 +79,15 @@ def diagnose(
 ) -> CommonMistake | None:
     """Return the interpretation with which a table agrees with a URDF; None if there is none.
 
-    Args:
-        chain: The path of the URDF.
-        data: The table's plain data from `urdfkin.dh.parse_table.mapping_from_text`.
-        tolerance: Tolerance at the tip (metres).
-        off: Tip error of the table as its file states it (metres). With the returned interpretation, the tip
-            error is at most 5 % of this error, or within `tolerance`.
+    `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `off` is the tip error
+    of the table as its file states it, and `tolerance` is the tolerance at the tip (metres). With the
+    returned interpretation, the tip error is at most 5 % of `off`, or within `tolerance`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     own = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
     try:
         said = as_said(data)
-    except InputError:  # an invalid convention or unit, which is reported elsewhere
+    except InputError:  # Another function reports this error.
         return None
     close = list[tuple[float, int, ConventionHypothesis, DHTable]]()
     for reading, table in other_readings(data):
@@ -115,7 +103,7 @@ def diagnose(
     for _, slips, reading, table in close[:_TRIED]:
         try:
             metres, radians = best_fit(chain, table, tolerance)
-        except RangeError:  # a length is too large in this interpretation
+        except RangeError:  # A length is too large in this interpretation.
             continue
         off_here = metres + radians * chain.reach
         if off_here <= max(tolerance, min(_EXPLAINS * off, _EXPLAINS * chain.reach)):
@@ -130,11 +118,7 @@ def convention_that_fits(
 ) -> Convention:
     """Find the convention of a table whose file names no convention, by a comparison with a path.
 
-    Args:
-        chain: The path of the URDF.
-        data: The table's plain data.
-        tolerance: Tolerance at the tip (metres).
-        where: The table's file.
+    `tolerance` is the tolerance at the tip (metres).
 
     Raises:
         InputError: both conventions fit equally well, or neither convention fits, even in other units.
@@ -195,8 +179,8 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     return np.array(numbers)
 
 
-#: Only the keys `_CELLS` of a row are used. The keys `_ENDS` of a table are ignored, because base and tool
-#: are fitted.
+#: Only the keys `_CELLS` of a row are used.
+#: The keys `_ENDS` of a table are ignored, because base and tool are fitted.
 _CELLS = ("joint", "kind", "sense", "beta", *ORDER)
 _ENDS = ("base", "tool", "coordinates")
 
@@ -207,8 +191,6 @@ class ConventionHypothesis:
 
     Attributes:
         convention: Standard or modified; None if the table names no convention.
-        lengths: Metres or millimetres.
-        angles: Radians or degrees.
         columns: Contents of the table's columns in this interpretation. The columns have the names a, alpha,
             d and theta, or are unnamed and in this order.
     """
@@ -222,17 +204,15 @@ class ConventionHypothesis:
         """Return the table in this interpretation, without base and tool; raise InputError if invalid."""
         said = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
         rows = [self._row(row) for row in data["rows"]]
-        return table_from_mapping({**_bare(data), **said, "rows": rows})
+        rest = {key: value for key, value in data.items() if key not in _ENDS}
+        return table_from_mapping({**rest, **said, "rows": rows})
 
     def _row(self, row: Mapping[str, Any]) -> dict[str, Any]:
         meant = dict(zip(ORDER, self.columns, strict=True))
         return {meant.get(key, key): value for key, value in row.items()}
 
     def slips(self, other: ConventionHypothesis) -> int:
-        """Return the number of differences between two interpretations.
-
-        Two exchanged columns are counted as one difference.
-        """
+        """Return the number of differences; two exchanged columns are counted as one difference."""
         moved = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
         return len(self._differences(other)) + (moved + 1) // 2
 
@@ -256,13 +236,14 @@ def as_said(data: Mapping[str, Any]) -> ConventionHypothesis:
 
 
 def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothesis, DHTable]]:
-    """Yield every other interpretation in which the table is valid.
+    """Yield every other interpretation in which the parser accepts the table, the most similar first.
 
-    Interpretations with the fewest differences from the file come first.
+    The parser rejects an impossible value, such as an angle of eighty turns.
     """
-    if not _has_rows(data):
+    rows = data.get("rows")
+    if not isinstance(rows, list) or not all(isinstance(row, (list, Mapping)) for row in rows):
         return
-    data, said = {**data, "rows": [_row(row) for row in data["rows"]]}, as_said(data)
+    data, said = {**data, "rows": [_row(row) for row in rows]}, as_said(data)
     every = (ConventionHypothesis(*one) for one in product(Convention, Lengths, Angles, permutations(ORDER)))
     for reading in sorted(every, key=lambda one: one.slips(said)):
         if reading == said:
@@ -273,32 +254,22 @@ def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothes
             continue
 
 
-def _has_rows(data: Mapping[str, Any]) -> bool:
-    rows = data.get("rows")
-    return isinstance(rows, list) and all(isinstance(row, (list, Mapping)) for row in rows)
-
-
-def _bare(data: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in data.items() if key not in _ENDS}
-
-
 def _row(row: Mapping[str, Any] | Sequence[Any]) -> dict[str, Any]:
     """Return a row of a file's data as a dict by cell name, without mimic rules and limits."""
     named = row if isinstance(row, Mapping) else dict(zip((*ORDER, "kind"), row, strict=False))
     return {key: value for key, value in named.items() if key in _CELLS}
 
 
-#: Largest and smallest plausible length (metres) in the table of an arm.
+#: Plausible lengths of an arm (metres)
 _LONGEST, _SHORTEST = 20.0, 1e-3
 
 
 def doubts(table: DHTable) -> list[str]:
     """Return warnings about units or columns that look wrong, each with a remedy.
 
-    Example:
-        >>> from urdfkin.dh.rows import table_from_rows
-        >>> doubts(table_from_rows([[425, 0, 0, 0], [392.25, 0, 0, 0]], "standard"))
-        ["lengths up to 425 m look like millimetres: if they are millimetres, write lengths = 'millimetres'"]
+    >>> from urdfkin.dh.rows import table_from_rows
+    >>> doubts(table_from_rows([[425, 0, 0, 0], [392.25, 0, 0, 0]], "standard"))
+    ["lengths up to 425 m look like millimetres: if they are millimetres, write lengths = 'millimetres'"]
     """
     found = []
     lengths = [abs(cell) for row in table.rows for cell in (row.a, row.d) if cell]

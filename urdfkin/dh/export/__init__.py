@@ -12,13 +12,15 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: For each format: the module with its function `write_NAME`, and a summary in one line. If the format is a
-#: language of `urdfkin export`, the name of the module is "".
+#: Only these formats have number units.
+_TEXT = "urdfkin.dh.export.text"
+#: Each format has a summary, and the module of its function `write_NAME`.
+#: The name of the module is "" for a language of `urdfkin export`.
 FORMATS: dict[str, tuple[str, str]] = {
-    "terminal": ("urdfkin.dh.export.text", "aligned text"),
-    "markdown": ("urdfkin.dh.export.text", "a Markdown table"),
-    "html": ("urdfkin.dh.export.text", "HTML, for a page or a notebook"),
-    "latex": ("urdfkin.dh.export.text", "a LaTeX table (booktabs)"),
+    "terminal": (_TEXT, "aligned text"),
+    "markdown": (_TEXT, "a Markdown table"),
+    "html": (_TEXT, "HTML, for a page or a notebook"),
+    "latex": (_TEXT, "a LaTeX table (booktabs)"),
     "csv": ("urdfkin.dh.export.data", "comma-separated, read back by urdfkin"),
     "json": ("urdfkin.dh.export.data", "JSON, read back by urdfkin"),
     "toml": ("urdfkin.dh.export.data", "TOML, read back by urdfkin"),
@@ -35,16 +37,11 @@ FORMATS: dict[str, tuple[str, str]] = {
 
 
 def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
-    """Return the table in a format.
+    """Return the table in a format of `FORMATS`.
 
-    Numeric code computes the placement, the Jacobian and the acceleration of the tip. Like the code from
-    `urdfkin export --form dh`, this code contains a self-test.
-
-    Args:
-        table: Any table.
-        format: A name in `FORMATS`.
-        units: Number format of printed tables; data and code are in metres and radians.
-        verify: Whether Pinocchio checks the exported code.
+    `units` is the number format of printed tables; data and code are in metres and radians. Numeric code
+    computes the placement, the Jacobian and the acceleration of the tip. Like the code from `urdfkin export
+    --form dh`, this code contains a self-test. With `verify`, Pinocchio checks the exported code.
 
     Raises:
         UnknownNameError: an unknown format.
@@ -52,7 +49,8 @@ def export(table: DHTable, format: str, units: Units | None = None, *, verify: b
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)
-    if not FORMATS[format][0]:
+    module, _ = FORMATS[format]
+    if not module:
         return str(hook("code in a language")(hook("code of a chain")(table, verify=verify), format))
-    write = getattr(importlib.import_module(FORMATS[format][0]), "write_" + format.replace("-", "_"))
-    return cast("str", write(table, units or Units()))
+    write = getattr(importlib.import_module(module), "write_" + format.replace("-", "_"))
+    return cast("str", write(table, units or Units()) if module == _TEXT else write(table))

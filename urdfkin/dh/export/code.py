@@ -22,9 +22,8 @@ from urdfkin.model.tree import FloatArray, is_bounded
 def identifier(name: str) -> str:
     """Return a valid name in C, Python and MATLAB.
 
-    Example:
-        >>> identifier("ur5 robot"), identifier("2dof"), identifier("for")
-        ('ur5_robot', 'robot_2dof', 'for_')
+    >>> identifier("ur5 robot"), identifier("2dof"), identifier("for")
+    ('ur5_robot', 'robot_2dof', 'for_')
     """
     word = re.sub(r"[^A-Za-z0-9_]", "_", name) or "robot"
     if not word[0].isalpha():
@@ -67,7 +66,7 @@ def demand_free(table: DHTable, what: str) -> None:
         raise InputError(
             f"{what} does not support mimic joints",
             where=f"table of {table.robot}",
-            remedy="load the robot with mimic off, or use another format, such as numpy or matlab",
+            remedy="load the robot with --no-mimic (mimic=False), or use another format, such as numpy",
         )
 
 
@@ -83,8 +82,7 @@ def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> lis
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
 
 
-#: Integers below this number are written as integers. Numbers with at most this denominator are written as
-#: fractions. Other numbers are written as decimals.
+#: Integers below this number, and fractions up to this denominator, are exact; other numbers are decimals.
 _LONGEST = 10**9
 
 
@@ -95,34 +93,28 @@ class Fractions(Units):
     """
 
     def length(self, metres: float) -> str:
-        """Format a length or another number."""
         sign, x = "-" if metres < 0.0 else "", Fraction(repr(abs(metres)))
         if x.denominator == 1 and x < _LONGEST:
             return f"{sign}{x}"
         return sign + (self.ratio(x) if x.denominator <= _LONGEST else self.decimal(abs(metres)))
 
     def angle(self, radians: float, pi: str = "pi") -> str:
-        """Format an angle."""
         if (fraction := pi_fraction(radians)) is not None:
             return re.sub(r"(\d)(?=[a-z])", r"\1*", fraction_text(fraction, pi))
         return ("-" if radians < 0.0 else "") + self.decimal(abs(radians))
 
     def ratio(self, x: Fraction) -> str:
-        """Format a fraction."""
         return f"Rational({x.numerator}, {x.denominator})"
 
     def decimal(self, x: float) -> str:
-        """Format any other number."""
         return repr(x)
 
 
 def columns(table: DHTable) -> str:
-    """Return the names of a row's cells."""
     return "a, alpha, d, theta" + (", beta" if table.has_hayati_rows else "")
 
 
 def rows(table: DHTable, number: Fractions, **style: Any) -> list[str]:
-    """Return the cells of each row, separated by commas."""
     return [", ".join(cells(table, row, number, number=number.length, **style)) for row in table.rows]
 
 
@@ -158,9 +150,8 @@ def placement(q):
 '''
 
 
-def write_sympy(table: DHTable, units: Units) -> str:
+def write_sympy(table: DHTable) -> str:
     """Return a module with `placement(q)`, for `q = symbols("q1:7")` or numbers."""
-    del units
     number, n = Fractions(), len(table.joint_names)
     base, tool = (
         "[" + ", ".join(f"[{', '.join(map(number.length, row))}]" for row in T.tolist()) + "]"
@@ -201,12 +192,11 @@ class _Matlab(Fractions):
         return f"vpa('{x!r}')"
 
 
-def write_matlab_symbolic(table: DHTable, units: Units) -> str:
+def write_matlab_symbolic(table: DHTable) -> str:
     """Return a function file `ROBOT_symbolic.m` for MATLAB.
 
     Use it as `[T, q] = ROBOT_symbolic()`, then `matlabFunction(T, 'Vars', {q})`.
     """
-    del units
     number, n = _Matlab(), len(table.joint_names)
     lines = [f"function [T, q] = {identifier(table.robot)}_symbolic()"]
     lines += [f"% {line}" for line in header(table)]

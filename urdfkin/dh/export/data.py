@@ -15,15 +15,11 @@ from dataclasses import asdict
 from typing import Any
 
 from urdfkin.dh.table import DHRow, DHTable
-from urdfkin.dh.units import Units
 from urdfkin.errors.escape import csv_cell, escape
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
-    """Return the table as plain data: strings, numbers, lists and mappings, in metres and radians.
-
-    The entry `snap` contains the report of the snapped angles.
-    """
+    """Return the table as plain data, in metres and radians; `snap` reports the snapped angles."""
     data: dict[str, Any] = {
         "convention": str(table.convention),
         "angles": "radians",
@@ -52,14 +48,8 @@ def to_mapping(table: DHTable) -> dict[str, Any]:
 
 
 def _row(row: DHRow) -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "joint": row.joint,
-        "kind": row.kind.value,
-        "a": row.a,
-        "alpha": row.alpha,
-        "d": row.d,
-        "theta": row.theta,
-    }
+    data: dict[str, Any] = {"joint": row.joint, "kind": row.kind.value}
+    data |= {name: getattr(row, name) for name in ("a", "alpha", "d", "theta")}
     if row.beta:
         data["beta"] = row.beta
     if row.sense != 1:
@@ -68,21 +58,17 @@ def _row(row: DHRow) -> dict[str, Any]:
         data["mimic"] = asdict(row.mimic)
     if row.limit is not None:
         names = ("lower", "upper", "velocity", "effort")
-        # JSON cannot store infinity, so an infinite limit is left out.
+        # JSON cannot store an infinite limit.
         limits = {name: getattr(row.limit, name) for name in names}
         data["limit"] = {name: value for name, value in limits.items() if math.isfinite(value)}
     return data
 
 
-def write_json(table: DHTable, units: Units) -> str:
-    """Return the table in JSON, in metres and radians."""
-    del units
+def write_json(table: DHTable) -> str:
     return json.dumps(to_mapping(table), indent=2, allow_nan=False) + "\n"
 
 
-def write_toml(table: DHTable, units: Units) -> str:
-    """Return the table in TOML, in metres and radians, with one line for each row."""
-    del units
+def write_toml(table: DHTable) -> str:
     data = to_mapping(table)
     rows = data.pop("rows")
     lines = [f"{key} = {_value(value)}" for key, value in data.items()]
@@ -95,7 +81,7 @@ def _value(value: Any) -> str:
         return "{" + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(_value(item) for item in value) + "]"
-    # JSON's numbers and escapes are valid in TOML, except for surrogate pairs.
+    # TOML accepts JSON's numbers and escapes, except for surrogate pairs.
     text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     return "".join(c if c.isprintable() else escape(c) for c in text)
 
@@ -106,9 +92,8 @@ COLUMNS = (
 )
 
 
-def write_csv(table: DHTable, units: Units) -> str:
+def write_csv(table: DHTable) -> str:
     """Return the table in CSV: comment lines `# key: value`, a line of column names, then the rows."""
-    del units
     data = to_mapping(table)
     rows = data.pop("rows")
     data.pop("snap", None)

@@ -1,9 +1,7 @@
 """Export a table as text: for a terminal, in Markdown, in HTML and in LaTeX.
 
-All formats contain the convention, the formula, base and tool. `document` makes one document, which is
-written as plain text, Markdown or HTML. The LaTeX table uses booktabs, names the convention in its caption,
-and is at most as wide as the text. All formats use the same functions for headings, cells, formulas and
-poses. The arguments of these functions define how a format writes pi, products and names.
+All formats contain the convention, the formula, base and tool. They use the same functions for headings,
+cells, formulas and poses. The arguments of these functions define how a format writes pi, products and names.
 """
 
 from __future__ import annotations
@@ -30,13 +28,12 @@ HAYATI_FORMULA = {
     Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
 }
 
-#: A number is multiplied by this factor before it is rounded up to three digits. Without this factor, a
-#: rounding error of 1e-12 could increase the last digit of a short number.
+#: A number is multiplied by this factor before it is rounded up to three digits.
+#: Without this factor, a rounding error of 1e-12 could increase the last digit of a short number.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
 def formula(table: DHTable) -> str:
-    """Return the formula for the transforms of a row, for example Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
     return (HAYATI_FORMULA if table.has_hayati_rows else FORMULA)[table.convention]
 
 
@@ -78,9 +75,9 @@ def added(variable: str, constant: str) -> str:
 
 
 def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
-    """Return a row's cells a, alpha, d and theta, and if needed beta, as text with the joint's variable.
+    """Return a row's cells a, alpha, d and theta as text with the joint's variable.
 
-    The cell beta is returned only if some row of the table has a beta that is not 0.
+    The cell beta is added if some row of the table has a beta that is not 0.
     """
     moves = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
@@ -94,7 +91,6 @@ def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any
 
 
 def headings(table: DHTable, units: Units) -> list[str]:
-    """Return the headings of the columns of `cells`, with units."""
     at = "(i-1)" if table.convention is Convention.MODIFIED else ""
     angle, length = units.angle_name, units.length_name
     named = {
@@ -108,21 +104,19 @@ def headings(table: DHTable, units: Units) -> list[str]:
 
 
 def is_identity(T: FloatArray) -> bool:
-    """Whether a pose is exactly the identity."""
     return bool(np.array_equal(T, np.eye(4)))
 
 
 def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
-    """Return the three upper rows of a pose matrix, with the position in metres."""
+    """Return the three upper rows of a pose, with the position in metres."""
     return Matrix([[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]])
 
 
 def at_most(value: float) -> str:
     """Format a bound with three digits, rounded up so that it remains a bound.
 
-    Example:
-        >>> at_most(7.5912e-06), at_most(0.0)
-        ('7.60e-06', '0')
+    >>> at_most(7.5912e-06), at_most(0.0)
+    ('7.60e-06', '0')
     """
     if value == 0.0:
         return "0"
@@ -131,10 +125,7 @@ def at_most(value: float) -> str:
 
 
 def snap_lines(table: DHTable) -> list[str]:
-    """Return lines of text about angles that were snapped to multiples of 15 degrees.
-
-    The first lines state the effect on the tip. Then there is a line for each snapped angle.
-    """
+    """Return lines about the snapped angles: first their effect on the tip, then a line for each angle."""
     snap = table.snap
     if snap is None:
         return []
@@ -158,11 +149,7 @@ def snap_lines(table: DHTable) -> list[str]:
 def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = False) -> TextDocument:
     """Return a document with a title, the formula, the rows, base and tool, and the effect of snapping.
 
-    Args:
-        table: The table.
-        units: Units, digits and order of the columns.
-        pi: Notation of pi.
-        wrapped: Whether to break long sentences into several lines.
+    `pi` is the notation of pi. With `wrapped`, long sentences are broken into several lines.
     """
     rows = [(str(i), row.joint, *cells(table, row, units, pi)) for i, row in enumerate(table.rows, 1)]
     parts: list[str | Table | Matrix] = [Code(formula(table)), ""]
@@ -185,17 +172,14 @@ def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = Fa
 
 
 def write_terminal(table: DHTable, units: Units) -> str:
-    """Return the table for a terminal."""
     return document(table, units, wrapped=True).text() + "\n"
 
 
 def write_markdown(table: DHTable, units: Units) -> str:
-    """Return the table in Markdown."""
     return document(table, units).markdown() + "\n"
 
 
 def write_html(table: DHTable, units: Units) -> str:
-    """Return the table in HTML."""
     return document(table, units, pi="\u03c0").html() + "\n"
 
 
@@ -225,25 +209,12 @@ def write_latex(table: DHTable, units: Units) -> str:
         texts = [maths(text) for text in cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")]
         rows.append([str(i), latex_text(row.joint), *texts])
     poses = {what: T for what, T in (("Base", table.base), ("Tool", table.tool)) if not is_identity(T)}
-    lines = [
-        r"\begin{table}",
-        r"  \centering",
-        f"  \\caption{{{_caption(table)}}}",
-        *fitted(
-            [
-                rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}",
-                r"  \toprule",
-                f"  {' & '.join(heads)} \\\\",
-                r"  \midrule",
-                *(f"  {' & '.join(row)} \\\\" for row in rows),
-                r"  \bottomrule",
-                r"\end{tabular}",
-            ]
-        ),
-        *(line for what, T in poses.items() for line in pose(what, T)),
-        r"\end{table}",
-    ]
-    return "\n".join(lines) + "\n"
+    frame = [rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}", r"  \toprule"]
+    frame += [f"  {' & '.join(heads)} \\\\", r"  \midrule", *(f"  {' & '.join(row)} \\\\" for row in rows)]
+    frame += [r"  \bottomrule", r"\end{tabular}"]
+    lines = [r"\begin{table}", r"  \centering", f"  \\caption{{{_caption(table)}}}", *fitted(frame)]
+    lines += [line for what, T in poses.items() for line in pose(what, T)]
+    return "\n".join([*lines, r"\end{table}"]) + "\n"
 
 
 def _caption(table: DHTable) -> str:
@@ -275,10 +246,7 @@ def pose(what: str, T: FloatArray) -> list[str]:
 
 
 def maths(text: str) -> str:
-    """Write a cell in LaTeX's math mode.
-
-    The text 1e-6 becomes a power of ten, and a fraction a/b is not changed.
-    """
+    """Write a cell in LaTeX's math mode; 1e-6 becomes a power of ten, and a fraction a/b is not changed."""
     return f"${_plain(text)}$"
 
 

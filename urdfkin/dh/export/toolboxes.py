@@ -2,7 +2,8 @@
 
 For roboticstoolbox the code makes a `DHRobot` of Revolute and Prismatic links (DH or MDH) with their limits.
 A DHRobot cannot have a fifth parameter, and must have at least one joint. A table with Hayati rows, or
-without rows, therefore becomes a `Robot` of elementary transforms.
+without rows, therefore becomes a `Robot` of elementary transforms (Haviland and Corke). The fifth parameter
+of a Hayati row is an additional transform.
 
 For the Robotics System Toolbox the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms
 ignore theta of a revolute joint and d of a prismatic joint, so they would lose the table's offsets. These
@@ -11,13 +12,6 @@ matrix from the table, and the joint's axis is the z axis.
 
 The MATLAB code is tested in Octave with substitutes for the toolbox's classes (`scripts/forms/octave`). The
 code has not been tested in MATLAB.
-
-roboticstoolbox also accepts a sequence of elementary transforms (Haviland and Corke). Each elementary
-transform is a rotation, a translation or a joint. The fifth parameter of a Hayati row is an additional
-transform in this sequence. The numerical solvers of roboticstoolbox accept such a sequence.
-
-`write_screws` exports a product of exponentials as text, LaTeX, TOML, JSON and code. The numbers in TOML,
-JSON and code are exact.
 """
 
 from __future__ import annotations
@@ -31,20 +25,15 @@ from urdfkin.dh.export.text import fitted, is_identity, maths, pose, pose_matrix
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import axes_and_steps
 from urdfkin.dh.table import Convention, DHRow, DHTable
-from urdfkin.dh.units import Units
 from urdfkin.errors.display import Code, Matrix, Table, TextDocument, six_digits
 from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
 
-def write_roboticstoolbox(table: DHTable, units: Units) -> str:
-    """Return a module with `robot`: a DHRobot, or a Robot if a DHRobot cannot express the table.
-
-    Raises:
-        InputError: the table has a mimic joint, which neither class supports.
-    """
+def write_roboticstoolbox(table: DHTable) -> str:
+    """Return a module with `robot`, a DHRobot or a Robot; raise InputError for a mimic joint."""
     if table.has_hayati_rows or not table.rows:
-        return write_ets(table, units)
+        return write_ets(table)
     demand_free(table, "DHRobot")
     lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "", "robot = rtb.DHRobot(", "    ["]
@@ -66,9 +55,8 @@ def _link(row: DHRow, convention: Convention) -> str:
     return f"rtb.{kind}{suffix}({', '.join([*given, *joint_transform(row)])})"
 
 
-def write_matlab_rst(table: DHTable, units: Units) -> str:
+def write_matlab_rst(table: DHTable) -> str:
     """Return a function file `ROBOT_tree.m`; its function returns a rigidBodyTree."""
-    del units
     demand_free(table, "rigidBodyTree")
     poses = frame_poses(table)
     lines = [f"function robot = {identifier(table.robot)}_tree()", *(f"% {line}" for line in header(table))]
@@ -92,13 +80,8 @@ def write_matlab_rst(table: DHTable, units: Units) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_ets(table: DHTable, units: Units) -> str:
-    """Return a module with two variables: `ets`, the transforms, and `robot`, a Robot of these transforms.
-
-    Raises:
-        InputError: the table has a mimic joint, which the class does not support.
-    """
-    del units
+def write_ets(table: DHTable) -> str:
+    """Return a module with `ets`, and `robot` of these transforms; raise InputError for a mimic joint."""
     demand_free(table, "a sequence of elementary transforms")
     lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
@@ -142,14 +125,16 @@ FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] 
 
 
 def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> str:
-    """Return the screws as "terminal", "markdown", "html", "latex", "toml", "json", "numpy" or "matlab"."""
+    """Return the screws as "terminal", "markdown", "html", "latex", "toml", "json", "numpy" or "matlab".
+
+    The numbers in TOML, JSON and code are exact.
+    """
     if form == "latex":
         return _latex(screws, digits)
     return _CODE[form](screws) if form in _CODE else screws_document(screws, digits).written(form)
 
 
 def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocument:
-    """Return a document with a title, the formula, the screws in space and body axes, and M."""
     parts: list[str | Table | Matrix] = [Code(FORMULA)]
     heads = ("i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
     for what, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
@@ -174,14 +159,6 @@ def _latex(screws: ProductOfExponentials, digits: int) -> str:
     lines = [r"\begin{table}", r"  \centering", rf"  \caption{{Space screws of {names}, metres.}}"]
     lines += fitted([*frame, *rows, r"  \bottomrule", r"\end{tabular}"])
     return "\n".join([*lines, *pose("$M$", screws.M), r"\end{table}"]) + "\n"
-
-
-def _toml(screws: ProductOfExponentials) -> str:
-    return "".join(f"{key} = {json.dumps(value)}\n" for key, value in screws.as_mapping().items())
-
-
-def _json(screws: ProductOfExponentials) -> str:
-    return json.dumps(screws.as_mapping(), indent=2) + "\n"
 
 
 def _numpy(screws: ProductOfExponentials) -> str:
@@ -217,10 +194,10 @@ def _matlab(screws: ProductOfExponentials) -> str:
     return "\n".join([*lines, "end"]) + "\n"
 
 
-#: Functions that write the formats for data and code. These formats contain exact numbers.
+#: These functions write exact numbers.
 _CODE: dict[str, Callable[[ProductOfExponentials], str]] = {
-    "toml": _toml,
-    "json": _json,
+    "toml": lambda screws: "".join(f"{key} = {json.dumps(x)}\n" for key, x in screws.as_mapping().items()),
+    "json": lambda screws: json.dumps(screws.as_mapping(), indent=2) + "\n",
     "numpy": _numpy,
     "matlab": _matlab,
 }
