@@ -41,7 +41,9 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def documented() -> Iterator[tuple[str, object]]:
-    """Each name of the reference, and each public member of its classes that urdfkin defines."""
+    """Each name of the reference with the public members of its classes, and each function of an equation."""
+    for name in re.findall(r"`(urdfkin\.kinematics\.[\w.]+)`", (DOCS / "equations.md").read_text("utf-8")):
+        yield name, pydoc.locate(name)
     for _, _, names in LIBRARY.values():
         for name in names.split():
             found = pydoc.locate(address(name))

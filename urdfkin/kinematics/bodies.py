@@ -72,11 +72,20 @@ class MovingFrame:
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
 
-    `inner` is the motion of frame 2 relative to frame 1, expressed in frame 1.
+    The motion is computed from the motion of frame 1 relative to frame 0 and the motion of frame 2 relative
+    to frame 1.
 
     The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. The
     angular velocity of frame 2 is w_01 + w_12 (7.49). The angular acceleration is the time derivative of w_01
     + w_12, which contains the term w_01 x w_12.
+
+    Args:
+        outer: Motion of frame 1 relative to frame 0.
+        inner: Motion of frame 2 relative to frame 1, expressed in frame 1. In this argument, for
+            example, `d_0_1` is the vector from O_1 to O_2.
+
+    Returns:
+        Motion of frame 2 relative to frame 0.
     """
     R, w = outer.R_0_1, outer.w_0_1
     d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
@@ -155,13 +164,36 @@ class AccelerationParts:
 
 
 def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
-    """Return p_0 = d_01 + R p_1 (7.58)."""
+    """Return p_0 = d_01 + R p_1 (7.58).
+
+    Args:
+        frame: Frame 1 in frame 0.
+        p_1: (..., 3) position of the point in frame 1, metres.
+
+    Returns:
+        (..., 3) position of the point in frame 0, metres.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
+    """
     p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, vectors(p_1, "p_1"))
     return p_0
 
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
-    """Return p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if the point is fixed in frame 1)."""
+    """Return p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if the point is fixed in frame 1).
+
+    Args:
+        frame: Frame 1 in frame 0.
+        p_1: (..., 3) position of the point in frame 1, metres.
+        v_1: (..., 3) velocity of the point in frame 1, m/s; by default 0.
+
+    Returns:
+        The terms; `.total` is the velocity, (..., 3) m/s in frame 0.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
+    """
     p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
     relative = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
@@ -174,6 +206,18 @@ def point_acceleration(
     """Return p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
 
     For a point that is fixed in frame 1, the result is equation 7.123.
+
+    Args:
+        frame: Frame 1 in frame 0.
+        p_1: (..., 3) position of the point in frame 1, metres.
+        v_1: (..., 3) velocity of the point in frame 1, m/s; by default 0.
+        a_1: (..., 3) acceleration of the point in frame 1, m/s^2; by default 0.
+
+    Returns:
+        The terms; `.total` is the acceleration, (..., 3) m/s^2 in frame 0.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
     """
     p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
@@ -186,10 +230,21 @@ def point_acceleration(
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
     """Return the interorigin vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 
-    `d` is the offset along the joint's axis, `a` the length of the common normal, and `x` its direction.
+    Args:
+        d: (...) offset d_i along the joint's axis, metres.
+        z: (..., 3) unit axis z_{i-1}.
+        a: (...) length a_i of the common normal, metres.
+        x: (..., 3) unit vector x_i along the common normal.
 
-    >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
-    array([0.5, 0. , 0.3])
+    Returns:
+        (..., 3) metres, in the frame of `z` and `x`.
+
+    Raises:
+        InputError: a wrong shape, or a vector that is not of unit length.
+
+    Example:
+        >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
+        array([0.5, 0. , 0.3])
     """
     vector: FloatArray = eq.interorigin_vector(
         scalars(d, "d"), unit_vectors(z, "z"), scalars(a, "a"), unit_vectors(x, "x")
@@ -198,7 +253,21 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 
 
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
-    """Return w_{i-1,i}: theta-dot z for a rotary joint (7.62), and zero for a prismatic joint (7.63)."""
+    """Return a joint's angular velocity w_{i-1,i}.
+
+    The angular velocity is theta-dot z for a rotary joint (7.62), and zero for a prismatic joint (7.63).
+
+    Args:
+        z: (..., 3) unit axis z_{i-1} in frame 0.
+        rate: (...) joint velocity, rad/s or m/s.
+        turns: Whether the joint is rotary.
+
+    Returns:
+        (..., 3) rad/s, in frame 0.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
+    """
     w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
     return w if turns else np.zeros_like(w)
 
@@ -206,9 +275,24 @@ def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatA
 def interorigin_velocity(
     w_0_i: ArrayLike, d_vector: ArrayLike, z: ArrayLike, rate: ArrayLike, turns: bool
 ) -> FloatArray:
-    """Return d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint (7.73, 7.74).
+    """Return the time derivative of an interorigin vector (7.73, 7.74).
+
+    It is d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint.
 
     If only joint i moves, w_0i is w_{i-1,i}, and the equations are 7.66 and 7.67.
+
+    Args:
+        w_0_i: (..., 3) angular velocity of link i, rad/s, in frame 0.
+        d_vector: (..., 3) interorigin vector d_{i-1,i}, metres, in frame 0.
+        z: (..., 3) unit axis z_{i-1} in frame 0.
+        rate: (...) joint velocity, rad/s or m/s.
+        turns: Whether the joint is rotary.
+
+    Returns:
+        (..., 3) time derivative of the vector in frame 0, m/s.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
     """
     rotation: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
     sliding: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
@@ -216,10 +300,20 @@ def interorigin_velocity(
 
 
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
-    """Return a joint's column of the velocity Jacobian, (..., 6) (7.80, 7.85).
+    """Return a joint's column of the velocity Jacobian (7.80, 7.85).
 
-    The column is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. `arm` is d_{i-1,n},
-    the moment arm from the joint's origin to the endpoint.
+    It is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint.
+
+    Args:
+        z: (..., 3) unit axis z_{i-1} in frame 0.
+        arm: (..., 3) moment arm d_{i-1,n} from the joint's origin to the endpoint, metres, in frame 0.
+        turns: Whether the joint is rotary.
+
+    Returns:
+        (..., 6) [linear; angular], in frame 0.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
     """
     z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
     linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
@@ -227,46 +321,98 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
 
 
 def planar_rotation(theta: ArrayLike) -> FloatArray:
-    """Return R(theta), (..., 2, 2), of the plane; its columns are the axes x1 and y1 in frame 0 (7.5)."""
+    """Return the rotation matrix R(theta) of the plane (7.5).
+
+    Args:
+        theta: (...) radians.
+
+    Returns:
+        (..., 2, 2) rotation; the columns are the axes x1 and y1 in frame 0.
+
+    Raises:
+        InputError: an angle is not a finite number.
+    """
     theta = scalars(theta, "theta")
     c, s = np.cos(theta), np.sin(theta)
     return np.stack((np.stack((c, -s), axis=-1), np.stack((s, c), axis=-1)), axis=-2)
 
 
 def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
-    """Return dR/dtheta, (..., 2, 2), of the rotation matrix in the plane (7.4, figure 7.2).
+    """Return dR/dtheta of the rotation matrix in the plane (7.4, figure 7.2).
 
     Its columns are y1 and -x1, which are the axes x1 and y1 turned by 90 degrees.
+
+    Args:
+        theta: (...) radians.
+
+    Returns:
+        (..., 2, 2), per radian.
+
+    Raises:
+        InputError: an angle is not a finite number.
     """
     R = planar_rotation(theta)
     return np.stack((R[..., 1], -R[..., 0]), axis=-1)
 
 
 def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return d_01 = a x1 = R a (1, 0), (..., 2), the endpoint of a link that turns about O_0 (7.1, 7.3).
+    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link that turns about O_0 (7.1, 7.3).
 
-    >>> link_endpoint(np.pi / 2, 2.0).round(12)
-    array([0., 2.])
+    Args:
+        theta: (...) joint angle, radians.
+        length: (...) link length a, metres.
+
+    Returns:
+        (..., 2) metres, in frame 0.
+
+    Raises:
+        InputError: a value is not a finite number.
+
+    Example:
+        >>> link_endpoint(np.pi / 2, 2.0).round(12)
+        array([0., 2.])
     """
     return scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return the velocity d-dot_01 = a theta-dot y1, (..., 2), of a link's endpoint (7.2, 7.4, 7.7).
+    """Return the velocity d-dot_01 = a theta-dot y1 of a link's endpoint (7.2, 7.4, 7.7).
 
     The velocity is tangential to the endpoint's circle, and its size is v = r w.
 
-    >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
-    array([0., 6.])
+    Args:
+        theta: (...) joint angle, radians.
+        rate: (...) joint velocity, rad/s.
+        length: (...) link length a, metres.
+
+    Returns:
+        (..., 2) m/s, in frame 0.
+
+    Raises:
+        InputError: a value is not a finite number.
+
+    Example:
+        >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
+        array([0., 6.])
     """
     speed = scalars(length, "length") * scalars(rate, "rate")
     return speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
 
 
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity (..., 6) of the tool frame from the velocity of frame n.
+    """Return the velocity of the tool frame from the velocity of frame n.
 
     The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}. The angular velocities are equal.
+
+    Args:
+        velocity: (..., 6) velocity of frame n, m/s and rad/s, in frame 0.
+        d_n_tool: (..., 3) vector from O_n to O_tool, metres, in frame 0.
+
+    Returns:
+        (..., 6) velocity of the tool frame, in frame 0.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
     """
     velocity, d = vectors(velocity, "velocity", 6), vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
@@ -275,12 +421,23 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity (..., 6) of frame n from the velocity of the tool frame (7.115).
+    """Return the velocity of frame n from the velocity of the tool frame (7.115).
 
     The linear velocity is d-dot_0n = d-dot_{0,tool} - w x d_{n,tool}. The angular velocities are equal.
 
-    >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
-    array([0., 0., 0., 0., 0., 2.])
+    Args:
+        velocity: (..., 6) velocity of the tool frame, m/s and rad/s, in frame 0.
+        d_n_tool: (..., 3) vector from O_n to O_tool, metres, in frame 0.
+
+    Returns:
+        (..., 6) velocity of frame n, in frame 0.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
+
+    Example:
+        >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
+        array([0., 0., 0., 0., 0., 2.])
     """
     return tool_velocity(velocity, -vectors(d_n_tool, "d_n_tool"))
 
@@ -294,10 +451,21 @@ def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the matrix C, (..., 6, 6 or 7), in [d-dot; w] = C x-dot (7.119, 7.120).
+    """Return the matrix C in [d-dot; w] = C x-dot (7.119, 7.120).
 
     C is block diagonal; its blocks are the identity and Omega. For a quaternion, Omega is 4 E^T (3 by 4),
     with the matrix E of 7.57.
+
+    Args:
+        representation: SciPy's name of an Euler sequence, or "quaternion".
+        R: (..., 3, 3) orientation of the end frame.
+
+    Returns:
+        (..., 6, 6), or (..., 6, 7) for a quaternion.
+
+    Raises:
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     if representation == QUATERNION:
         return _blocks(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
@@ -305,11 +473,25 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return C^-1, (..., 6 or 7, 6), with x-dot = C^-1 [d-dot; w] (7.122).
+    """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
 
     For a quaternion, C has several right inverses. The function returns the right inverse for which the
     quaternion's time derivative is perpendicular to the quaternion. The quaternion's length then stays
     constant. This right inverse has no singularity.
+
+    Args:
+        representation: SciPy's name of an Euler sequence, or "quaternion".
+        R: (..., 3, 3) orientation of the end frame.
+        nearest: Least allowed distance from the representational singularity, radians.
+
+    Returns:
+        (..., 6, 6), or (..., 7, 6) for a quaternion.
+
+    Raises:
+        RepresentationSingularityError: Euler angles of a sample are within `nearest` of the singularity,
+            where Omega cannot be inverted. The error contains the distance.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     if representation == QUATERNION:
         return _blocks(quaternion_rate_matrix(quaternion_of(R)))
@@ -319,7 +501,23 @@ def representation_inverse(representation: str, R: ArrayLike, nearest: float = N
 def analytical_jacobian(
     representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return J = C^-1 J_v, the manipulator Jacobian (7.122)."""
+    """Return J = C^-1 J_v, the manipulator Jacobian (7.122).
+
+    Args:
+        representation: SciPy's name of an Euler sequence, or "quaternion".
+        R: (..., 3, 3) orientation of the end frame.
+        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in frame 0.
+        nearest: Least allowed distance from the representational singularity, radians.
+
+    Returns:
+        (..., 6, n), or (..., 7, n) for a quaternion: the derivatives of x with respect to the joint
+            coordinates.
+
+    Raises:
+        RepresentationSingularityError: see `representation_inverse`.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
+    """
     return representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
 
 
@@ -327,6 +525,18 @@ def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatA
     """Return the velocity Jacobian J_v = C J from the manipulator Jacobian J (7.121).
 
     Unlike the inverse conversion, this conversion works for every orientation.
+
+    Args:
+        representation: SciPy's name of an Euler sequence, or "quaternion".
+        R: (..., 3, 3) orientation of the end frame.
+        J: (..., 6, n), or (..., 7, n) for a quaternion; the manipulator Jacobian.
+
+    Returns:
+        (..., 6, n), [linear; angular], in frame 0.
+
+    Raises:
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
     """
     C = representation_matrix(representation, R)
     return C @ _rows(J, "J", C.shape[-1])
@@ -335,13 +545,41 @@ def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatA
 def pose_rates(
     representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation."""
+    """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation.
+
+    Args:
+        representation: SciPy's name of an Euler sequence, or "quaternion".
+        R: (..., 3, 3) orientation of the frame.
+        velocity: (..., 6) [linear; angular] in frame 0, m/s and rad/s.
+        nearest: Least allowed distance from the representational singularity, radians.
+
+    Returns:
+        (..., 6), or (..., 7) for a quaternion.
+
+    Raises:
+        RepresentationSingularityError: see `representation_inverse`.
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
+    """
     column = vectors(velocity, "velocity", 6)[..., np.newaxis]
     return (representation_inverse(representation, R, nearest) @ column)[..., 0]
 
 
 def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """Return [d-dot; w] = C x-dot (7.119)."""
+    """Return [d-dot; w] = C x-dot (7.119).
+
+    Args:
+        representation: SciPy's name of an Euler sequence, or "quaternion".
+        R: (..., 3, 3) orientation of the frame.
+        rates: (..., 6), or (..., 7) for a quaternion; the rates x-dot.
+
+    Returns:
+        (..., 6) [linear; angular] in frame 0, m/s and rad/s.
+
+    Raises:
+        UnknownNameError: the representation does not exist.
+        InputError: a wrong shape, or `R` is not a rotation.
+    """
     C = representation_matrix(representation, R)
     column = vectors(rates, "rates", C.shape[-1])[..., np.newaxis]
     return (C @ column)[..., 0]

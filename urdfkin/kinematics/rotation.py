@@ -59,10 +59,20 @@ from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, 
 def skew(w: ArrayLike) -> FloatArray:
     """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16).
 
-    >>> skew([0.0, 0.0, 1.0]) + 0.0
-    array([[ 0., -1.,  0.],
-           [ 1.,  0.,  0.],
-           [ 0.,  0.,  0.]])
+    Args:
+        w: (..., 3), any unit, any frame.
+
+    Returns:
+        (..., 3, 3), in the unit and frame of `w`.
+
+    Raises:
+        InputError: `w` is not (..., 3) or not finite.
+
+    Example:
+        >>> skew([0.0, 0.0, 1.0]) + 0.0
+        array([[ 0., -1.,  0.],
+               [ 1.,  0.,  0.],
+               [ 0.,  0.,  0.]])
     """
     w = vectors(w, "w")
     S = np.zeros((*w.shape, 3))
@@ -72,14 +82,24 @@ def skew(w: ArrayLike) -> FloatArray:
 
 
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return the vector w of a skew-symmetric matrix S = S(w), the inverse of `skew` (7.26, 7.37).
+    """Return the vector w of a skew-symmetric matrix S = S(w), the inverse of `skew`.
 
     A computed S has a small symmetric part, caused by rounding. The function removes this part: each
-    component of w is the mean of two entries, S_ij and -S_ji. If an entry of the symmetric part is larger
-    than `tolerance` times the largest entry of S, the function raises InputError.
+    component of w is the mean of two entries, S_ij and -S_ji.
 
-    >>> unskew(skew([1.0, 2.0, 3.0]))
-    array([1., 2., 3.])
+    Args:
+        S: (..., 3, 3).
+        tolerance: Largest allowed entry of the symmetric part, relative to the largest entry of S.
+
+    Returns:
+        (..., 3), in the unit and frame of `S`.
+
+    Raises:
+        InputError: `S` is not (..., 3, 3), not finite, or not skew-symmetric (7.26, 7.37).
+
+    Example:
+        >>> unskew(skew([1.0, 2.0, 3.0]))
+        array([1., 2., 3.])
     """
     S = matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -93,7 +113,18 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
 
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
-    """Return R S(w) R^T = S(R w), the skew-symmetric matrix of frame 1 expressed in frame 0 (7.46)."""
+    """Return R S(w) R^T = S(R w), a skew-symmetric matrix expressed in another frame (7.46).
+
+    Args:
+        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
+        S_1: (..., 3, 3) skew-symmetric matrix of a vector in frame 1.
+
+    Returns:
+        (..., 3, 3) skew-symmetric matrix of the same vector in frame 0.
+
+    Raises:
+        InputError: a wrong shape, or `R_0_1` is not a rotation.
+    """
     R_0_1 = rotations(R_0_1, "R_0_1")
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
@@ -152,34 +183,79 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
 
 
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
-    """Return the time derivative R-dot = S(w) R of a rotation matrix, in 1/s (7.38, 7.42)."""
+    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42).
+
+    Args:
+        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
+        w_0_1: (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
+
+    Returns:
+        (..., 3, 3) time derivative of `R_0_1`, 1/s.
+
+    Raises:
+        InputError: a wrong shape, or `R_0_1` is not a rotation.
+    """
     return skew(vectors(w_0_1, "w_0_1")) @ rotations(R_0_1, "R_0_1")
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
     """Return the angular velocity w, for which S(w) = R-dot R^T (7.38).
 
-    Equations 7.35 to 7.37 show that such a w exists if `R_rate` is the rate of a rotation. Otherwise, the
-    function raises InputError; `tolerance` is explained in `unskew`.
+    Equations 7.35 to 7.37 show that such a w exists.
 
-    >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    >>> angular_velocity_of(R, rotation_rate(R, [1.0, 2.0, 3.0]))
-    array([1., 2., 3.])
+    Args:
+        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
+        R_rate: (..., 3, 3) time derivative of `R_0_1`, 1/s.
+        tolerance: Largest allowed entry of the symmetric part of R-dot R^T, relative to the largest entry of
+            R-dot R^T.
+
+    Returns:
+        (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
+
+    Raises:
+        InputError: a wrong shape, `R_0_1` is not a rotation, or `R_rate` is not the rate of a rotation.
+
+    Example:
+        >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+        >>> angular_velocity_of(R, rotation_rate(R, [1.0, 2.0, 3.0]))
+        array([1., 2., 3.])
     """
     R_0_1 = rotations(R_0_1, "R_0_1")
     return unskew(matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
 
 
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
-    """Return the time derivative w x p of a vector p that is fixed in a turning frame (7.39 to 7.41)."""
+    """Return the time derivative w x p of a vector p that is fixed in a turning frame (7.39 to 7.41).
+
+    Args:
+        w_0_1: (..., 3) angular velocity of the frame, rad/s, expressed in frame 0.
+        p_0: (..., 3) vector, metres, expressed in frame 0.
+
+    Returns:
+        (..., 3) time derivative of the vector in frame 0, m/s.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
+    """
     return np.cross(vectors(w_0_1, "w_0_1"), vectors(p_0, "p_0"))
 
 
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
-    """Return the angular velocity w_0n of the last frame, expressed in frame 0 (7.43 to 7.50).
+    """Return the angular velocity w_0n of the last frame (7.43 to 7.50).
 
-    Entry i of `Rs` (..., n, 3, 3) is the orientation of frame i + 1 in frame i. Entry i of `ws` (..., n, 3)
-    is the angular velocity of frame i + 1 relative to frame i, expressed in frame i.
+    The result is the sum of the angular velocities of each frame relative to the previous frame, all
+    expressed in frame 0.
+
+    Args:
+        Rs: (..., n, 3, 3); entry i is the orientation of frame i + 1 in frame i.
+        ws: (..., n, 3); entry i is the angular velocity of frame i + 1 relative to frame i, rad/s, expressed
+            in frame i.
+
+    Returns:
+        (..., 3) angular velocity of frame n relative to frame 0, rad/s, expressed in frame 0.
+
+    Raises:
+        InputError: a wrong shape, different numbers n in `Rs` and `ws`, or a matrix that is not a rotation.
     """
     Rs, ws = rotations(Rs, "Rs"), vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
@@ -265,11 +341,21 @@ ExpressedIn = Literal["fixed", "body"]
 
 
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the matrix E (..., 4, 3) in (q-dot, q0-dot) = E w (7.57).
+    """Return the matrix E in (q-dot, q0-dot) = E w (7.57).
 
     For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
     changes. The columns of E have length 1/2. The columns are perpendicular to each other and to the
     quaternion, so the quaternion's length is constant.
+
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        frame: Frame of `w`: "fixed" or "body".
+
+    Returns:
+        (..., 4, 3), dimensionless.
+
+    Raises:
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -283,8 +369,20 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
     """Return the time derivative of a body's quaternion from the body's angular velocity w (7.57).
 
-    >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
-    array([0., 0., 1., 0.])
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        w: (..., 3) angular velocity of the body, rad/s.
+        frame: Frame of `w`: "fixed" means frame 0, "body" means the body's own frame.
+
+    Returns:
+        (..., 4) rates, 1/s, scalar last.
+
+    Raises:
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
+
+    Example:
+        >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
+        array([0., 0., 1., 0.])
     """
     return (quaternion_rate_matrix(quat, frame) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
@@ -296,6 +394,17 @@ def angular_velocity_from_quaternion_rates(
 
     The function ignores the component of the rates along the quaternion, because this component changes only
     the quaternion's length.
+
+    Args:
+        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
+        rates: (..., 4) rates of `quat`, 1/s, scalar last.
+        frame: Frame of the result: "fixed" means frame 0, "body" means the body's own frame.
+
+    Returns:
+        (..., 3) angular velocity of the body, rad/s.
+
+    Raises:
+        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
     """
     E = quaternion_rate_matrix(quat, frame)
     return 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
@@ -355,10 +464,21 @@ def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28).
 
-    >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
-    array([[ 0., -1.,  0.],
-           [ 1.,  0.,  0.],
-           [ 0.,  0.,  1.]])
+    Args:
+        axis: (..., 3) unit axis k.
+        angle: (...) angle phi in radians.
+
+    Returns:
+        (..., 3, 3) rotation.
+
+    Raises:
+        InputError: a wrong shape, a value that is not finite, or an axis that is not a unit vector.
+
+    Example:
+        >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
+        array([[ 0., -1.,  0.],
+               [ 1.,  0.,  0.],
+               [ 0.,  0.,  1.]])
     """
     axis = unit_vectors(axis, "axis")
     angle = scalars(angle, "angle")[..., np.newaxis, np.newaxis]
@@ -369,29 +489,84 @@ def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
 
 
 def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms)."""
+    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        angle: (...) angle phi in radians.
+
+    Returns:
+        (..., 3, 3), 1/rad.
+
+    Raises:
+        InputError: as for `rotation_about`.
+    """
     return skew(axis) @ rotation_about(axis, angle)
 
 
 def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
-    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34)."""
+    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        rate: (...) phi-dot in rad/s.
+
+    Returns:
+        (..., 3) rad/s, in the frame of `axis`.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
+    """
     return scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
-    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about k (7.21)."""
+    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about k (7.21).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        rate: (...) phi-dot in rad/s.
+        p: (..., 3) vector from a point on the axis, in metres.
+
+    Returns:
+        (..., 3) velocity in m/s, in the frame of the arguments.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
+    """
     return np.cross(angular_velocity_about(axis, rate), vectors(p, "p"))
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Split a vector p = k (k . p) + r into the part along the axis k and the radial part r (7.18)."""
+    """Split a vector p = k (k . p) + r into the part along the axis k and the radial part r (7.18).
+
+    Args:
+        axis: (..., 3) unit axis k.
+        p: (..., 3).
+
+    Returns:
+        Two arrays (..., 3): the component of p along the axis, and the component r perpendicular to the axis.
+
+    Raises:
+        InputError: a wrong shape, or an axis that is not a unit vector.
+    """
     axis, p = unit_vectors(axis, "axis"), vectors(p, "p")
     along = axis * (axis * p).sum(axis=-1, keepdims=True)
     return along, p - along
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi."""
+    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi.
+
+    Args:
+        rotation_vector: (..., 3), radians.
+
+    Returns:
+        (..., 3, 3) rotation.
+
+    Raises:
+        InputError: a wrong shape, or a value that is not finite.
+    """
     vector = vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
@@ -554,12 +729,24 @@ NEAREST = 1e-9
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
     """Return the matrix Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
 
-    The columns of the matrix are the axes of the three rotations, expressed in frame 0.
+    The columns of the matrix are the axes of the three rotations.
 
-    >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
-    array([[0., 0., 1.],
-           [0., 1., 0.],
-           [1., 0., 0.]])
+    Args:
+        name: SciPy's name of the sequence; the textbook's is "ZYZ".
+        angles: (..., 3) radians, in the order of the name.
+
+    Returns:
+        (..., 3, 3), dimensionless, expressed in frame 0.
+
+    Raises:
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+
+    Example:
+        >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
+        array([[0., 0., 1.],
+               [0., 1., 0.],
+               [1., 0., 0.]])
     """
     axes = sequence(name)
     turns = axes.turning(vectors(angles, "angles"))
@@ -571,16 +758,42 @@ def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54)."""
+    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54).
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+        rates: (..., 3) rates of the angles, rad/s.
+
+    Returns:
+        (..., 3) angular velocity, rad/s, expressed in frame 0.
+
+    Raises:
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
+    """
     product = euler_rate_matrix(name, angles) @ vectors(rates, "rates")[..., np.newaxis]
     return product[..., 0]
 
 
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return the rates Omega^-1 w of Euler angles from the angular velocity w, in closed form (7.56).
+    """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56).
 
-    If the distance from the singularity is `nearest` radians or less, it raises
-    RepresentationSingularityError.
+    They are computed in closed form.
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+        w: (..., 3) angular velocity, rad/s, expressed in frame 0.
+        nearest: Least allowed distance from the singularity, radians.
+
+    Returns:
+        (..., 3) rates, rad/s, in the order of the name.
+
+    Raises:
+        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
     """
     return (euler_rate_inverse(name, angles, nearest) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
@@ -588,9 +801,22 @@ def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEA
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return the matrix Omega^-1, computed from the geometry of the axes and not by elimination (7.56).
 
-    In the frame after the first rotation, the first and the second axis are coordinate axes. The third axis
-    has no component along the second axis. One component of w then gives the third rate, and the other two
-    components give the first and the second rate. The errors are those of `euler_rates`.
+    In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
+    axis has no component along the second axis. One component of w then gives the third rate, and the other
+    two components give the first and the second rate.
+
+    Args:
+        name: SciPy's name of the sequence.
+        angles: (..., 3) radians, in the order of the name.
+        nearest: Least allowed distance from the singularity, radians.
+
+    Returns:
+        (..., 3, 3).
+
+    Raises:
+        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
+        UnknownNameError: the sequence does not exist.
+        InputError: a wrong shape, or a value that is not finite.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
