@@ -21,9 +21,7 @@ angles = st.one_of(
 #: Names of every script, with everything that XML must escape; none that looks like xacro,
 #: which the checks refuse.
 names = st.text(
-    st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn", "Co")),
-    min_size=1,
-    max_size=8,
+    st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn", "Co")), min_size=1, max_size=8
 ).filter(lambda name: "${" not in name)
 
 

@@ -58,11 +58,7 @@ def disagreement(robot: Robot, quantity: str, **base: BaseMotion) -> urdfkin.Ver
 def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(panda: Robot) -> None:
     error = disagreement(panda, "acceleration")
     assert error.is_disagreement
-    assert (error.quantity, error.frame, error.reference) == (
-        "acceleration",
-        "panda_hand_tcp",
-        "LOCAL",
-    )
+    assert (error.quantity, error.frame, error.reference) == ("acceleration", "panda_hand_tcp", "LOCAL")
     assert len(error.index) == 2
     assert error.ours.shape == error.theirs.shape == error.bound.shape == (6,)
     assert (np.abs(error.ours - error.theirs) > error.bound).any()
@@ -132,10 +128,7 @@ def test_the_certificate_counts_what_was_checked_and_says_what_was_not(panda: Ro
     panda.placement(q[:2], ["panda_hand", "panda_link3", "panda_link4"])
     certificate = panda.certificate()
     assert certificate.verified
-    assert {line.quantity: line.checked for line in certificate.lines} == {
-        "jacobian": 5,
-        "placement": 6,
-    }
+    assert {line.quantity: line.checked for line in certificate.lines} == {"jacobian": 5, "placement": 6}
     assert all(0.0 < line.worst < 100.0 and 0.0 < line.share < 1.0 for line in certificate.lines)
     assert certificate.oracle.startswith("Pinocchio 4.")
     panda.velocity(q, q, "panda_hand", verify=False)

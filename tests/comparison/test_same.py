@@ -365,9 +365,7 @@ def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
     assert asked == []
 
 
-def test_a_certificate_that_names_what_is_not_there_is_refused(
-    compared: tuple[Robot, Robot, Any],
-) -> None:
+def test_a_certificate_that_names_what_is_not_there_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
     a, b, document = compared
     forged = copy.deepcopy(document)
     forged["joints"][0]["b"] = "elsewhere"

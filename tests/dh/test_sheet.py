@@ -219,9 +219,7 @@ def test_a_robot_called_robot_is_no_key_of_a_sheet() -> None:
 
 @pytest.mark.slow
 @given(
-    trees(min_joints=1),
-    st.sampled_from(["standard", "modified"]),
-    st.sampled_from(["terminal", "markdown"]),
+    trees(min_joints=1), st.sampled_from(["standard", "modified"]), st.sampled_from(["terminal", "markdown"])
 )
 @settings(max_examples=40)
 def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: str, form: str) -> None:

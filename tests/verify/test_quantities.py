@@ -180,7 +180,7 @@ def test_a_robot_has_a_method_for_each_row_that_takes_its_inputs(row: Quantity) 
 
 def test_every_command_of_the_table_is_its_rows() -> None:
     assert list(by_command()) == [
-        *("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration"),
+        *("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration")
     ]
 
 
