@@ -13,16 +13,8 @@ TURNS = np.array([0.0, math.pi / 2, math.pi, -math.pi / 2])
 
 #: How the next axis stands to the one before it.
 RELATIONS = (
-    "skew",
-    "square",
-    "meeting",
-    "parallel",
-    "antiparallel",
-    "collinear",
-    "near",
-    "near-anti",
-    "coaxial-ish",
-)
+    "skew", "square", "meeting", "parallel", "antiparallel", "collinear", "near", "near-anti", "coaxial-ish",
+)  # fmt: skip
 
 #: How many of them, from the first, have no tiny tilts or offsets.
 TAME = 6

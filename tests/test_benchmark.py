@@ -32,13 +32,9 @@ def test_the_quick_benchmark_finds_equal_results_and_writes_every_section(tmp_pa
     file, picture = tmp_path / "figures.json", tmp_path / "figures.svg"
     command = [sys.executable, str(ROOT / "scripts/benchmark.py"), "--quick", "--json", str(file)]
     run = subprocess.run(
-        [*command, "--plot", str(picture)],
-        check=True,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-    )
+        [*command, "--plot", str(picture)], check=True, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+    )  # fmt: skip
     figures = json.loads(file.read_text())
     assert {row["section"] for row in figures["rows"]} | {"memory", "where", "first"} == set(
         benchmark.SECTIONS

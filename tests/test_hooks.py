@@ -26,14 +26,9 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("hatchling", "click")
 #: What a build needs of the repository.
 SOURCES = (
-    "pyproject.toml",
-    "README.md",
-    "LICENSE",
-    ".pre-commit-hooks.yaml",
-    "urdfkin",
-    "robots",
+    "pyproject.toml", "README.md", "LICENSE", ".pre-commit-hooks.yaml", "urdfkin", "robots",
     "docs/questions.md",
-)
+)  # fmt: skip
 
 LONG = """<robot name="r"><link name="a"/><link name="b"/>
   <joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>

@@ -37,21 +37,12 @@ def f(x: "1 < 2", limit=3):
 '''
 
 WHAT = {
-    "x < limit  ->  x <= limit",
-    "x < limit and (not x)  ->  x < limit or not x",
-    "not x  ->  not not x",
-    "3  ->  4",
-    "raise ValueError('x < 3')  ->  pass",
-    "-2  ->  +2",
-    "2  ->  3",
-    "if done(x)  ->  if not done(x)",
-    "continue  ->  break",
-    "log(y)  ->  None",
-    "min  ->  max",
-    "1.5  ->  2.25",
-    "True  ->  False",
+    "x < limit  ->  x <= limit", "x < limit and (not x)  ->  x < limit or not x", "not x  ->  not not x",
+    "3  ->  4", "raise ValueError('x < 3')  ->  pass", "-2  ->  +2", "2  ->  3",
+    "if done(x)  ->  if not done(x)", "continue  ->  break", "log(y)  ->  None", "min  ->  max",
+    "1.5  ->  2.25", "True  ->  False",
     "min(x, 1.5) if ready else True  ->  min(x, 1.5) if not ready else True",
-}
+}  # fmt: skip
 
 
 def test_every_kind_of_slip_is_made_once_and_nothing_that_does_not_run_is_touched() -> None:

@@ -62,12 +62,9 @@ def test_what_was_not_measured_is_said_to_be_missing() -> None:
 def test_the_page_shows_where_the_time_of_a_batch_and_of_a_single_call_goes() -> None:
     where = [
         {
-            "kind": kind,
-            "robot": "panda",
-            "quantity": "jacobian",
-            "ns": 40.0,
+            "kind": kind, "robot": "panda", "quantity": "jacobian", "ns": 40.0,
             "parts": {"walk": 10.0, "rest": 30.0},
         }
         for kind in ("batch", "single")
-    ]
+    ]  # fmt: skip
     assert page(TEXT, {**FIGURES, "where": where}).count("| walk | 10.0 (25 %) |") == 2

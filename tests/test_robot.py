@@ -198,13 +198,9 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
 
 
 INPUTS = {
-    "text": "abc",
-    "complex numbers": np.ones(8) * 1j,
-    "a ragged list": [[1.0], [1.0, 2.0]],
-    "none": None,
-    "dates": np.zeros(8, dtype="datetime64[s]"),
-    "strings of numbers": ["0"] * 8,
-}
+    "text": "abc", "complex numbers": np.ones(8) * 1j, "a ragged list": [[1.0], [1.0, 2.0]], "none": None,
+    "dates": np.zeros(8, dtype="datetime64[s]"), "strings of numbers": ["0"] * 8,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", INPUTS)

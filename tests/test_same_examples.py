@@ -34,13 +34,9 @@ def draws(folder: Path, *imported: str) -> str:
     )
     path = os.pathsep.join([str(folder), str(ROOT)])
     return subprocess.run(
-        [sys.executable, str(script), *imported],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": path},
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout
+        [sys.executable, str(script), *imported], cwd=ROOT, env={**os.environ, "PYTHONPATH": path},
+        check=True, capture_output=True, text=True,
+    ).stdout  # fmt: skip
 
 
 @pytest.mark.slow

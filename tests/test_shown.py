@@ -37,15 +37,12 @@ def robot() -> Robot:
 def objects(robot: Robot) -> dict[str, Any]:
     rates = "neutral, panda_joint1=1, panda_joint2=0.5"
     return {
-        "robot": robot,
-        "table": robot.dh(),
-        "chain": robot.chain(),
+        "robot": robot, "table": robot.dh(), "chain": robot.chain(),
         "breakdown": robot.acceleration_breakdown("ready", rates, rates),
         "breakdown of a batch": robot.acceleration_breakdown(robot.sample(4), rates, rates),
-        "certificate": robot.certificate(),
-        "findings": urdfkin.load("planar_two_link").findings,
+        "certificate": robot.certificate(), "findings": urdfkin.load("planar_two_link").findings,
         "check": urdfkin.check('<robot name="r"><link name="base"/><link name="stray"/></robot>'),
-    }
+    }  # fmt: skip
 
 
 #: What must stand in each form of each object.
@@ -56,14 +53,11 @@ SAYS = {
     "breakdown": ("Acceleration by joint and kind", "panda_joint2", "centripetal", "coriolis", "sum"),
     "breakdown of a batch": ("sample", "... and 2 more samples"),
     "certificate": (
-        "panda: NOT verified by Pinocchio",
-        "jacobian",
-        "the check was turned off by verify=False",
-        "sha256",
+        "panda: NOT verified by Pinocchio", "jacobian", "the check was turned off by verify=False", "sha256",
     ),
     "findings": ("no findings",),
     "check": ("1 error", "URDF411", "stray", "the link has no parent"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -238,16 +232,10 @@ def printed(name: str) -> dict[str, str]:
     compared = urdfkin.same(robot, other)
     changed = urdfkin.diff(text, text.replace('xyz="0.3', 'xyz="0.4'))
     found: dict[str, Any] = {
-        "robot": robot,
-        "certificate": robot.certificate(),
-        "chain": robot.chain(),
-        "table": robot.dh(),
-        "breakdown": robot.acceleration_breakdown(q, q, q),
-        "enclosures": robot.enclose(q, q, q),
-        "same": compared,
-        "findings": robot.findings,
-        "report": urdfkin.validate([text], samples=0),
-    }
+        "robot": robot, "certificate": robot.certificate(), "chain": robot.chain(), "table": robot.dh(),
+        "breakdown": robot.acceleration_breakdown(q, q, q), "enclosures": robot.enclose(q, q, q),
+        "same": compared, "findings": robot.findings, "report": urdfkin.validate([text], samples=0),
+    }  # fmt: skip
     found |= {f"finding {k}": one for k, one in enumerate(robot.findings)}
     found |= {f"change {k}": one for k, one in enumerate(changed.changes)}
     found |= {f"effect {k}": one for k, one in enumerate(changed.effects)}

@@ -313,18 +313,11 @@ def disguised(tree: KinematicTree, seed: int = 0) -> KinematicTree:
 
 #: Changes that leave a robot the same.
 ALIKE: dict[str, Change] = {
-    "base moved": on_a_stand,
-    "links split": split,
-    "links merged": merged,
-    "axes flipped": flipped,
-    "zeros shifted": shifted,
-    "all renamed": renamed,
-    "other way up": rerooted,
-    "counted elsewhere": counted_elsewhere,
-    "slides exchanged": exchanged,
-    "all of it": everything,
+    "base moved": on_a_stand, "links split": split, "links merged": merged, "axes flipped": flipped,
+    "zeros shifted": shifted, "all renamed": renamed, "other way up": rerooted,
+    "counted elsewhere": counted_elsewhere, "slides exchanged": exchanged, "all of it": everything,
     "all of it, no name left": disguised,
-}
+}  # fmt: skip
 #: Changes that do not; a file rounded to four digits may be what it was.
 UNLIKE: dict[str, Change] = {
     **{f"tilted by {a:g}": partial(tilted, angle=a) for a in (1e-9, 1e-7, 1e-5, 1e-3, 1e-2)},

@@ -36,12 +36,9 @@ NEW = (
 
 def test_each_attribute_is_told_and_what_means_the_same_is_not() -> None:
     assert [str(change) for change in urdfkin.diff(OLD, NEW).changes] == [
-        "joint shoulder: limit upper 2 -> 1.5",
-        "joint elbow: origin x 0.4 -> 0.425",
-        "joint flange: new",
-        "link upper: inertial mass 2 -> 2.5",
-        "link tool: new",
-    ]
+        "joint shoulder: limit upper 2 -> 1.5", "joint elbow: origin x 0.4 -> 0.425", "joint flange: new",
+        "link upper: inertial mass 2 -> 2.5", "link tool: new",
+    ]  # fmt: skip
     assert not urdfkin.diff(OLD, OLD.replace("0.4 0 0", "4e-1 0.0 -0"))
 
 

@@ -100,13 +100,10 @@ def test_a_frame_that_slides_without_end_has_no_bound() -> None:
 
 #: Robots, changes, frames: turns alone, a slide, followers, an axis that alone is bent.
 BOXES = [
-    ("panda", "rounded", "panda_hand_tcp"),
-    ("panda", "rounded", "panda_leftfinger"),
-    ("ur3_gripper", "tilted by 0.01", "wrist_3_link"),
-    ("elbow", "axis bent", "tool"),
-    ("panda", "other rule", "panda_rightfinger"),
-    ("so100", "rounded", "jaw"),
-]
+    ("panda", "rounded", "panda_hand_tcp"), ("panda", "rounded", "panda_leftfinger"),
+    ("ur3_gripper", "tilted by 0.01", "wrist_3_link"), ("elbow", "axis bent", "tool"),
+    ("panda", "other rule", "panda_rightfinger"), ("so100", "rounded", "jaw"),
+]  # fmt: skip
 
 
 def searched_boxes(name: str, what: str, link: str) -> tuple[Search, FramePair]:

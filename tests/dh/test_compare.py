@@ -28,13 +28,10 @@ def elbow(kinds: str = "RRRRRR") -> KinematicTree:
     """Six joints, a parallel pair, skew and meeting ones: every inner cell can be told from the others."""
     square = rotation("x", math.pi / 2)
     steps = [
-        shift(0, 0, 0.3),
-        shift(0.05, 0.02, 0.1) @ square,
-        shift(0.4, 0, 0.1),
-        shift(0.35, 0.01, 0) @ rotation("y", 0.7),
-        shift(0, -0.2, 0.1) @ square,
+        shift(0, 0, 0.3), shift(0.05, 0.02, 0.1) @ square, shift(0.4, 0, 0.1),
+        shift(0.35, 0.01, 0) @ rotation("y", 0.7), shift(0, -0.2, 0.1) @ square,
         shift(0.02, 0.05, 0) @ rotation("x", -math.pi / 2),
-    ]
+    ]  # fmt: skip
     return arm(*steps[: len(kinds)], kinds=kinds, tip=shift(0.1, 0, 0.08))
 
 

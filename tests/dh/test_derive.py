@@ -394,13 +394,10 @@ def test_any_number_reads_back(value: float) -> None:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("pi", math.pi),
-        ("-pi/2", -math.pi / 2),
-        ("3*pi/4", 3 * math.pi / 4),
-        (" 2 pi / 3 ", 2 * math.pi / 3),
-        ("1e-3", 1e-3),
+        ("pi", math.pi), ("-pi/2", -math.pi / 2), ("3*pi/4", 3 * math.pi / 4),
+        (" 2 pi / 3 ", 2 * math.pi / 3), ("1e-3", 1e-3),
     ],
-)
+)  # fmt: skip
 def test_multiples_of_pi_are_read(text: str, value: float) -> None:
     assert read_number(text, "x") == pytest.approx(value, rel=1e-15)
 

@@ -28,14 +28,10 @@ turn = st.one_of(st.sampled_from(list(TURNS)), st.floats(-3.0, 3.0))
 length = st.one_of(st.just(0.0), st.floats(0.05, 0.5), st.floats(-0.5, -0.05))
 slight = st.floats(3.0, 12.0).map(lambda digits: 10.0**-digits)
 tilts = {
-    "parallel": st.just(0.0),
-    "antiparallel": st.just(math.pi),
-    "nearly parallel": slight,
-    "nearly antiparallel": slight.map(lambda tilt: math.pi - tilt),
-    "far feet": st.floats(0.012, 0.34),
-    "skew": st.floats(0.4, 2.7),
-    "square": st.just(math.pi / 2.0),
-}
+    "parallel": st.just(0.0), "antiparallel": st.just(math.pi), "nearly parallel": slight,
+    "nearly antiparallel": slight.map(lambda tilt: math.pi - tilt), "far feet": st.floats(0.012, 0.34),
+    "skew": st.floats(0.4, 2.7), "square": st.just(math.pi / 2.0),
+}  # fmt: skip
 
 
 @st.composite

@@ -76,13 +76,10 @@ def test_a_table_from_the_tree_of_a_table_is_as_exact(tree: KinematicTree, conve
 
 
 STANFORD = [
-    (0.0, -np.pi / 2, 0.412, 0.0, "R"),
-    (0.0, np.pi / 2, 0.154, 0.0, "R"),
-    (0.0203, 0.0, 0.0, -np.pi / 2, "P"),
-    (0.0, -np.pi / 2, 0.0, 0.0, "R"),
-    (0.0, np.pi / 2, 0.0, 0.0, "R"),
+    (0.0, -np.pi / 2, 0.412, 0.0, "R"), (0.0, np.pi / 2, 0.154, 0.0, "R"),
+    (0.0203, 0.0, 0.0, -np.pi / 2, "P"), (0.0, -np.pi / 2, 0.0, 0.0, "R"), (0.0, np.pi / 2, 0.0, 0.0, "R"),
     (0.0, 0.0, 0.0, 0.0, "R"),
-]
+]  # fmt: skip
 
 
 def test_the_stanford_arm_survives_the_way_to_a_tree_and_back_cell_by_cell() -> None:
@@ -115,13 +112,8 @@ def test_a_leader_off_the_path_stays_a_coordinate_in_the_tree() -> None:
 )
 def test_an_inconsistent_row_is_refused(change: dict[str, object], message: str) -> None:
     fields: dict[str, object] = {
-        "a": 0.0,
-        "alpha": 0.0,
-        "d": 0.0,
-        "theta": 0.0,
-        "kind": JointKind.REVOLUTE,
-        "joint": "j",
-    }
+        "a": 0.0, "alpha": 0.0, "d": 0.0, "theta": 0.0, "kind": JointKind.REVOLUTE, "joint": "j",
+    }  # fmt: skip
     with pytest.raises(InputError, match=message):
         DHRow(**{**fields, **change})  # type: ignore[arg-type]
 

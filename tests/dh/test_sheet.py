@@ -342,13 +342,8 @@ PIECES = (
 )
 #: For each format of `export`: the suffix of its files.
 SUFFIXES = {
-    "csv": ".csv",
-    "markdown": ".md",
-    "latex": ".tex",
-    "terminal": ".txt",
-    "toml": ".toml",
-    "json": ".json",
-}
+    "csv": ".csv", "markdown": ".md", "latex": ".tex", "terminal": ".txt", "toml": ".toml", "json": ".json",
+}  # fmt: skip
 
 
 @cache

@@ -101,13 +101,8 @@ def test_the_fewest_slips_are_tried_first() -> None:
 def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> None:
     file = tmp_path / "ur5.toml"
     rows: list[list[float]] = [
-        [0, 90, 89.159],
-        [-425, 0, 0],
-        [-392.25, 0, 0],
-        [0, 90, 109.15],
-        [0, -90, 94.65],
-        [0, 0, 82.3],
-    ]
+        [0, 90, 89.159], [-425, 0, 0], [-392.25, 0, 0], [0, 90, 109.15], [0, -90, 94.65], [0, 0, 82.3],
+    ]  # fmt: skip
     text = "rows = [" + ", ".join(f"{[*row, 0]}" for row in rows) + "]\n"
     arguments = ("ur5", "--base", "base", "--tip", "tool0", "--compare", str(file))
     file.write_text('convention = "modified"\nangles = "degrees"\n' + text)

@@ -28,13 +28,10 @@ NAMES = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
 def table(lengths: dict[str, float], offsets: list[float], signs: list[int], tilt: float = 0.0) -> DHTable:
     """The arm of the parameters, written as Brandstoetter's drawing has it."""
     cells = [
-        (lengths["a1"], -H, lengths["c1"], 0.0),
-        (lengths["c2"], tilt, 0.0, -H),
-        (lengths["a2"], H, lengths["b"], H),
-        (0.0, -H, lengths["c3"], 0.0),
-        (0.0, H, 0.0, 0.0),
+        (lengths["a1"], -H, lengths["c1"], 0.0), (lengths["c2"], tilt, 0.0, -H),
+        (lengths["a2"], H, lengths["b"], H), (0.0, -H, lengths["c3"], 0.0), (0.0, H, 0.0, 0.0),
         (0.0, 0.0, lengths["c4"], 0.0),
-    ]
+    ]  # fmt: skip
     rows = [
         {"a": a, "alpha": alpha, "d": d, "theta": math.remainder(theta - offset, 2 * math.pi), "sense": sign}
         for (a, alpha, d, theta), offset, sign in zip(cells, offsets, signs, strict=True)

@@ -20,13 +20,9 @@ from urdfkin.verify.oracle import QueryBatch
 
 H = math.pi / 2
 PUMA: list[list[float]] = [
-    [0, H, 0, 0],
-    [0.4318, 0, 0, 0],
-    [0.0203, -H, 0.15005, 0],
-    [0, H, 0.4318, 0],
-    [0, -H, 0, 0],
+    [0, H, 0, 0], [0.4318, 0, 0, 0], [0.0203, -H, 0.15005, 0], [0, H, 0.4318, 0], [0, -H, 0, 0],
     [0, 0, 0, 0],
-]
+]  # fmt: skip
 
 
 def of_tree(tree: KinematicTree) -> Structure:
@@ -63,13 +59,9 @@ def test_a_wrist_that_misses_its_point_says_by_how_much(offset: float) -> None:
 @pytest.mark.parametrize("tilt", [0.0, 0.0066])
 def test_three_parallel_axes_are_told_with_their_tilt(tilt: float) -> None:
     rows: list[list[float]] = [
-        [0, H, 0.18, 0],
-        [-0.61, tilt, 0, 0],
-        [-0.57, 0, 0, 0],
-        [0, H, 0.17, 0],
-        [0, -H, 0.12, 0],
+        [0, H, 0.18, 0], [-0.61, tilt, 0, 0], [-0.57, 0, 0, 0], [0, H, 0.17, 0], [0, -H, 0.12, 0],
         [0, 0, 0.1, 0],
-    ]
+    ]  # fmt: skip
     found = of_rows(rows)
     assert found.kinds[0].name == "three parallel axes"
     assert found.kinds[0].radians == pytest.approx(tilt, abs=1e-12)

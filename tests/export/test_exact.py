@@ -170,13 +170,10 @@ def test_a_double_cannot_enter_an_exact_expression() -> None:
 @pytest.mark.parametrize(
     ("decimals", "text"),
     [
-        ("1.5707963267948966", "pi/2"),
-        ("-3.141592653589793", "(-pi)"),
-        ("1.3089969389957472", "5*pi/12"),
-        ("1.5708", "Rational(3927, 2500)"),
-        ("0", "0"),
+        ("1.5707963267948966", "pi/2"), ("-3.141592653589793", "(-pi)"), ("1.3089969389957472", "5*pi/12"),
+        ("1.5708", "Rational(3927, 2500)"), ("0", "0"),
     ],
-)
+)  # fmt: skip
 def test_an_angle_is_a_multiple_of_pi_if_its_double_is_the_nearest_one(decimals: str, text: str) -> None:
     assert literal(ExactGraph().angle(Fraction(decimals))) == text
 
@@ -197,11 +194,8 @@ _LEFT_OUT = count(-1, -1)
 #: What sine and cosine may be off by, in halves of an eps.
 SINE = 2.0
 _OPERATIONS: dict[str, Callable[..., Counted]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "neg": operator.neg,
-}
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "neg": operator.neg,
+}  # fmt: skip
 
 
 def of_constant(R: Matrix, S: FloatArray) -> Matrix:

@@ -31,13 +31,9 @@ from urdfkin.verify.quantities import ACCELERATION, JACOBIAN
 
 INPUTS = (0.7, -1.3, 2.9)
 _OPERATIONS: dict[str, Callable[..., Any]] = {
-    "+": lambda x, y: x + y,
-    "-": lambda x, y: x - y,
-    "*": lambda x, y: x * y,
-    "neg": lambda x: -x,
-    "sin": math.sin,
-    "cos": math.cos,
-}
+    "+": lambda x, y: x + y, "-": lambda x, y: x - y, "*": lambda x, y: x * y, "neg": lambda x: -x,
+    "sin": math.sin, "cos": math.cos,
+}  # fmt: skip
 
 
 def value(x: Any) -> float:
@@ -116,15 +112,9 @@ def test_an_equation_notes_its_numbers_on_what_it_makes_itself_or_through_anothe
 
 
 ODD = (
-    "floating_root",
-    "planar_and_floating_in_the_middle",
-    "two_floating_in_a_row",
-    "mimic_hand_40_sliding",
-    "followers_of_followers",
-    "sizes",
-    "sliding_only",
-    "default_everything",
-)
+    "floating_root", "planar_and_floating_in_the_middle", "two_floating_in_a_row", "mimic_hand_40_sliding",
+    "followers_of_followers", "sizes", "sliding_only", "default_everything",
+)  # fmt: skip
 
 
 @pytest.mark.slow

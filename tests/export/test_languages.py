@@ -66,15 +66,11 @@ def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None
 @pytest.mark.parametrize(
     ("number", "text"),
     [
-        (0, "0.0"),
-        (1, "1.0"),
-        (-0.375, "-0.375"),
-        ("0.1", "0.1"),
-        ("1e70", "1.0e+70"),
+        (0, "0.0"), (1, "1.0"), (-0.375, "-0.375"), ("0.1", "0.1"), ("1e70", "1.0e+70"),
         ("-2.5e-7", "-2.5e-7"),
         ("0.6666666666666666666666666666666666666666666666666666666", f"0.{'6' * 49}7"),
     ],
-)
+)  # fmt: skip
 def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_the_end(
     number: str | float, text: str
 ) -> None:
@@ -297,14 +293,10 @@ def test_numpys_functions_refuse_a_wrong_length_and_convert_whole_numbers(tmp_pa
 @pytest.mark.parametrize(
     ("wrong", "found"),
     [
-        ([1j, 0.0], "complex128"),
-        (["1", "2"], "<U1"),
-        ("ab", "<U2"),
-        ([None, 0.0], "object"),
-        ({"q": 1.0}, "object"),
-        (np.array(["2026-11-24"] * 2, dtype="datetime64[D]"), r"datetime64\[D\]"),
+        ([1j, 0.0], "complex128"), (["1", "2"], "<U1"), ("ab", "<U2"), ([None, 0.0], "object"),
+        ({"q": 1.0}, "object"), (np.array(["2026-11-24"] * 2, dtype="datetime64[D]"), r"datetime64\[D\]"),
     ],
-)
+)  # fmt: skip
 def test_numpys_functions_refuse_numbers_that_are_not_real(wrong: Any, found: str, tmp_path: Path) -> None:
     own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numpy", tmp_path))
     with pytest.raises(TypeError, match=rf"q needs real numbers: found {found}$"):

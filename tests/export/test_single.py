@@ -89,14 +89,10 @@ def worst(made: Made, scale: float = 1.0) -> float:
 
 #: An expression whose only error is that of one operation. 0.75 is a number of single precision.
 OPERATIONS: dict[str, Made] = {
-    "+": lambda g, x, y, z: x + y,
-    "-": lambda g, x, y, z: x - z,
-    "*": lambda g, x, y, z: x * y,
-    "/": lambda g, x, y, z: x / y,
-    "sqrt": lambda g, x, y, z: g.root(x),
-    "sin": lambda g, x, y, z: g.sine_cosine(x)[0],
-    "cos": lambda g, x, y, z: g.sine_cosine(x)[1],
-}
+    "+": lambda g, x, y, z: x + y, "-": lambda g, x, y, z: x - z, "*": lambda g, x, y, z: x * y,
+    "/": lambda g, x, y, z: x / y, "sqrt": lambda g, x, y, z: g.root(x),
+    "sin": lambda g, x, y, z: g.sine_cosine(x)[0], "cos": lambda g, x, y, z: g.sine_cosine(x)[1],
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("op", OPERATIONS)

@@ -145,12 +145,9 @@ def test_printed_command_lines_take_at_most_half_a_page(
 ) -> None:
     (tmp_path / "a.pdf").write_bytes(as_pdf(desk, pages["arms"]))
     text = subprocess.run(
-        ["pdftotext", "-layout", str(tmp_path / "a.pdf"), "-"],
-        check=True,
-        capture_output=True,
-        text=True,
+        ["pdftotext", "-layout", str(tmp_path / "a.pdf"), "-"], check=True, capture_output=True, text=True,
         timeout=60,
-    ).stdout
+    ).stdout  # fmt: skip
     assert "Worst cases" in text
     assert len(re.findall(r"urdfkin \w+ (?:panda|ur5) --frame", text)) == 0
     assert "has the command that computes each case again" in " ".join(text.split())

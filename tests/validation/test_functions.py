@@ -28,12 +28,9 @@ from urdfkin.verify.quantities import recursive_quantities
 
 #: Robots and frames: serial arms, a branched robot, a hand, and fingers that mimic.
 FRAMES = {
-    "ur5": "tool0",
-    "kinova": "j2s6s200_end_effector",
-    "a1": "FL_foot",
-    "xarm7": "link_eef",
+    "ur5": "tool0", "kinova": "j2s6s200_end_effector", "a1": "FL_foot", "xarm7": "link_eef",
     "panda": "panda_rightfinger",
-}
+}  # fmt: skip
 MIMICS = {
     "panda": "panda_rightfinger",
     "talos": "gripper_left_fingertip_1_link",

@@ -146,15 +146,11 @@ def test_where_nothing_moves_or_nothing_is_drawn_there_are_the_same_lines(name: 
 @pytest.mark.parametrize(
     ("ours", "theirs", "worse"),
     [
-        ((6.1, 1.0), (3.0, 1.0), True),
-        ((6.0, 1.0), (3.0, 1.0), False),
-        ((3.0, 0.61), (3.0, 0.3), True),
-        ((3.0, 0.6), (3.0, 0.3), False),
-        ((0.9, 0.9), (0.5, 0.5), False),
-        ((2.1, 2.1), (1.0, 1.0), True),
+        ((6.1, 1.0), (3.0, 1.0), True), ((6.0, 1.0), (3.0, 1.0), False), ((3.0, 0.61), (3.0, 0.3), True),
+        ((3.0, 0.6), (3.0, 0.3), False), ((0.9, 0.9), (0.5, 0.5), False), ((2.1, 2.1), (1.0, 1.0), True),
         ((1.9, 1.9), (1.0, 1.0), False),
     ],
-)
+)  # fmt: skip
 def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
     ours: tuple[float, float], theirs: tuple[float, float], worse: bool
 ) -> None:

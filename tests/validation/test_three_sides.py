@@ -66,15 +66,11 @@ def test_sums_add_up_in_any_order() -> None:
 @pytest.mark.parametrize(
     ("answers", "agree"),
     [
-        ((0, 4, 4), (True, True, True)),
-        ((0, 5, 4), (False, True, True)),
-        ((0, 4, 16), (True, True, True)),
-        ((0, 4, 17), (True, False, True)),
-        ((0, -4, 16), (True, True, True)),
-        ((0, -4, 17), (True, False, False)),
-        ((0, -5, 16), (False, True, False)),
+        ((0, 4, 4), (True, True, True)), ((0, 5, 4), (False, True, True)), ((0, 4, 16), (True, True, True)),
+        ((0, 4, 17), (True, False, True)), ((0, -4, 16), (True, True, True)),
+        ((0, -4, 17), (True, False, False)), ((0, -5, 16), (False, True, False)),
     ],
-)
+)  # fmt: skip
 def test_two_answers_agree_up_to_their_bound_and_no_further(
     answers: tuple[float, float, float], agree: tuple[bool, bool, bool]
 ) -> None:

@@ -86,15 +86,11 @@ def test_what_was_refused_is_not_counted(robot: Robot) -> None:
     bad = np.full(robot.nq, np.nan)
     fast = robot.prepare(FRAME)
     calls: list[Callable[[], object]] = [
-        lambda: fast.placement(bad),
-        lambda: fast.velocity(q, bad),
-        lambda: fast.jacobian(q[:3]),
-        lambda: fast.jacobian(q, out=np.zeros((6, 9))),
-        lambda: fast.acceleration(q, q, bad),
-        lambda: robot.jacobian(bad, FRAME),
-        lambda: robot.placement(bad, robot.link_frames),
+        lambda: fast.placement(bad), lambda: fast.velocity(q, bad), lambda: fast.jacobian(q[:3]),
+        lambda: fast.jacobian(q, out=np.zeros((6, 9))), lambda: fast.acceleration(q, q, bad),
+        lambda: robot.jacobian(bad, FRAME), lambda: robot.placement(bad, robot.link_frames),
         lambda: robot.velocity(q, q, FRAME, out=q),
-    ]
+    ]  # fmt: skip
     for compute in calls:
         with pytest.raises(InputError):
             compute()

@@ -61,21 +61,11 @@ def size(plan: CompiledTree, magnitudes: Magnitudes, reference: Reference) -> Fl
 
 
 TURNING = replace(
-    VELOCITY,
-    name="angular velocity",
-    title="angular velocity",
-    shape=(3,),
-    compute=turning,
-    ask=pinocchios,
-    scale=size,
-    head="turns",
-    labels=("wx", "wy", "wz"),
-    units={"angular": "rad/s"},
-    command="angular-velocity",
-    summary="angular velocity of a frame",
-    page="How fast it turns.",
+    VELOCITY, name="angular velocity", title="angular velocity", shape=(3,), compute=turning, ask=pinocchios,
+    scale=size, head="turns", labels=("wx", "wy", "wz"), units={"angular": "rad/s"},
+    command="angular-velocity", summary="angular velocity of a frame", page="How fast it turns.",
     example="urdfkin angular-velocity ur5",
-)
+)  # fmt: skip
 
 
 @pytest.fixture

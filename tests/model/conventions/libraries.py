@@ -366,12 +366,6 @@ def pinocchio(robot: Robot, folder: Path) -> Library:
 
 
 LIBRARIES = {
-    "pinocchio": pinocchio,
-    "mujoco": mujoco,
-    "drake": drake,
-    "idyntree": idyntree,
-    "rtb": rtb,
-    "newton": newton,
-    "newton-usd": newton_usd,
-    "usd": usd,
-}
+    "pinocchio": pinocchio, "mujoco": mujoco, "drake": drake, "idyntree": idyntree, "rtb": rtb,
+    "newton": newton, "newton-usd": newton_usd, "usd": usd,
+}  # fmt: skip

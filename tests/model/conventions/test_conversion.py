@@ -37,14 +37,11 @@ ODD = [
     )
     for k, (linear, angular, order, point, quat) in enumerate(
         itertools.product(
-            ("body", "parent"),
-            ("body", "parent"),
-            ("linear first", "angular first"),
-            ("origin", "centre of mass"),
-            ("xyzw", "wxyz"),
+            ("body", "parent"), ("body", "parent"), ("linear first", "angular first"),
+            ("origin", "centre of mass"), ("xyzw", "wxyz"),
         )
     )
-]
+]  # fmt: skip
 PLANAR = """<robot name="cart"><link name="world"/><link name="cart"/><link name="arm"/>
 <joint name="plane" type="planar"><parent link="world"/><child link="cart"/><axis xyz="0 0 1"/>
 <origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/></joint>
@@ -455,17 +452,9 @@ def test_the_command_writes_a_map_that_other_commands_read(tmp_path: Path) -> No
     text = ",".join(map(repr, theirs.tolist()))
     frame = a.link_names[-1]
     done = run(
-        "placement",
-        str(files[0]),
-        "--convention",
-        str(files[2]),
-        "--frame",
-        frame,
-        "--q",
-        text,
-        "--format",
+        "placement", str(files[0]), "--convention", str(files[2]), "--frame", frame, "--q", text, "--format",
         "json",
-    )
+    )  # fmt: skip
     assert done.code == 0, done.err
     assert np.allclose(done.data["result"][0], a.placement(q, frame), 0, 1e-14)
     order = run("order", str(files[0]), "--to", str(files[2])).text

@@ -198,15 +198,11 @@ H1_2_URDF = _humanoid(
 @pytest.mark.parametrize(
     ("robot", "convention", "published"),
     [
-        ("anymal_c", "isaaclab", ANYMAL),
-        ("anymal_c", "isaacgym", ANYMAL_GYM),
-        ("go2", "isaaclab", GO2),
-        (H1_URDF, "isaaclab", H1),
-        (H1_2_URDF, "isaaclab", H1_2),
-        ("panda", "isaaclab", PANDA),
+        ("anymal_c", "isaaclab", ANYMAL), ("anymal_c", "isaacgym", ANYMAL_GYM), ("go2", "isaaclab", GO2),
+        (H1_URDF, "isaaclab", H1), (H1_2_URDF, "isaaclab", H1_2), ("panda", "isaaclab", PANDA),
     ],
     ids=["anymal_c", "anymal_c isaacgym", "go2", "h1", "h1_2", "panda"],
-)
+)  # fmt: skip
 def test_the_order_is_the_published_one(robot: str, convention: str, published: list[str]) -> None:
     loaded = urdfkin.load(robot, verify=False)
     assert list(loaded.convention(convention).joint_names) == published

@@ -58,12 +58,9 @@ def moving_base(seed: int) -> BaseMotion:
 
 def quantities(enclosed: Enclosures) -> Iterator[Enclosure]:
     yield from (
-        enclosed.placement,
-        enclosed.velocity,
-        enclosed.acceleration,
-        enclosed.jacobian,
+        enclosed.placement, enclosed.velocity, enclosed.acceleration, enclosed.jacobian,
         enclosed.jacobian_rate,
-    )
+    )  # fmt: skip
 
 
 def holds(enclosure: Enclosure, true: NDArray[np.object_]) -> bool:
