@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -34,6 +35,13 @@ def rotation(axis: str, angle: float) -> FloatArray:
     T[k, j] = math.sin(angle)
     T[j, k] = -T[k, j]
     return T
+
+
+def z_joint(
+    name: str, T: FloatArray | None = None, kind: JointKind = JointKind.REVOLUTE, **more: Any
+) -> Joint:
+    """A joint with its axis along z, at T in its parent; `more` are its limit and its rule."""
+    return Joint(name, kind, 0, np.eye(4) if T is None else T, np.array([0.0, 0.0, 1.0]), **more)
 
 
 def shift(x: float, y: float, z: float) -> FloatArray:

@@ -52,7 +52,7 @@ def test_a_decimal_lies_in_its_interval_however_large_its_exponent(word: str, di
 
 @given(finite)
 def test_a_double_is_an_interval_of_itself(x: float) -> None:
-    assert true_ends(exact(x)) == (x, x)
+    assert true_ends(exact(x)) == (Fraction(x), Fraction(x))
 
 
 @pytest.mark.parametrize("digits", DIGITS)
