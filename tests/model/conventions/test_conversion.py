@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,12 +34,14 @@ from urdfkin.verify.quantities import JACOBIAN, PLACEMENT, Quantity
 
 FLOATING = tuple(name for name in BUILT_IN if name != "idyntree")
 #: Every combination of axes, orders and points, also those that no tool has.
-_FIELDS = {
+_FIELDS: dict[Any, tuple[str, str]] = {
     "linear": ("body", "parent"), "angular": ("body", "parent"), "base_v": ("linear first", "angular first"),
     "point": ("origin", "centre of mass"), "quaternion": ("xyzw", "wxyz"),
 }  # fmt: skip
-_COMBINED = [dict(zip(_FIELDS, values, strict=True)) for values in itertools.product(*_FIELDS.values())]
-ODD = [Convention(name=f"odd {k}", six=how["base_v"], **how) for k, how in enumerate(_COMBINED)]
+ODD = [
+    replace(Convention(name=f"odd {k}", six=how[2]), **dict[Any, Any](zip(_FIELDS, how, strict=True)))
+    for k, how in enumerate(itertools.product(*_FIELDS.values()))
+]
 PLANAR = urdfs.robot(
     joint("plane", "planar", "world", "cart", 'xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"'),
     joint("turn", "continuous", "cart", "arm", 'xyz="0.5 0 0"', "0 1 0"),
