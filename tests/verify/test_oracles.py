@@ -279,7 +279,7 @@ def test_options_of_load_are_no_difference(how: dict[str, Any]) -> None:
 
 def more(x: float, *at: int) -> Callable[[Any], Any]:
     """Return the change of an array at one place."""
-    return lambda array: array + x * np.all(np.indices(array.shape).T == np.array(at), axis=-1).T
+    return lambda array: array + x * np.equal(np.indices(array.shape).T, at).all(axis=-1).T
 
 
 #: Attribute of the joint that yourdfpy reads, its change, and the words about it.
