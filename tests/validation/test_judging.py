@@ -143,9 +143,8 @@ def test_a_text_that_changed_since_it_was_compared_is_not_judged(judge: Judge, t
     report = validate([str(robot)], samples=0, store=store)
     robot.write_text('<robot name="b"><link name="l"/></robot>')
     how = {"mimic": None, "root_joint": None, "xacro_args": None}
-    assert judge_all(report, [str(robot)], StudySettings(1, 0, False), store=store, how=how).judgements == (
-        None,
-    )
+    found = judge_all(report, [str(robot)], StudySettings(1, 0, False), store=store, how=how)
+    assert found.judgements == (None,)
     assert judge.asked == []
     assert not list(store.glob("chunks/*/*.judged"))
 
