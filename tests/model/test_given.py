@@ -83,9 +83,7 @@ def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: 
         ({"lift": None, "shoulder": 0, "elbow": 0}, "q, lift must be real numbers: found None"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_meant_is_refused_with_its_place_and_a_remedy(
-    text: Any, message: str, arm: Robot
-) -> None:
+def test_what_cannot_be_meant_is_refused_with_place_and_remedy(text: Any, message: str, arm: Robot) -> None:
     with pytest.raises(UrdfkinError) as error:
         arm.placement(text, "e")
     assert message in str(error.value)

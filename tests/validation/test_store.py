@@ -79,9 +79,7 @@ def test_a_stores_report_is_the_one_of_a_single_run(undisturbed: str, tmp_path: 
     assert numbers(stored(tmp_path)) == undisturbed
 
 
-def test_what_is_there_is_not_computed_again(
-    undisturbed: str, ran: list[tuple[str, int]], tmp_path: Path
-) -> None:
+def test_what_is_there_is_not_redone(undisturbed: str, ran: list[tuple[str, int]], tmp_path: Path) -> None:
     first = validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(2))
     assert first.interrupted
     assert stored(tmp_path).interrupted

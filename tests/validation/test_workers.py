@@ -156,9 +156,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.long
-def test_workers_killed_at_random_times_change_no_number(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_workers_killed_at_any_time_change_no_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Twenty seeds: when, which of two, and how often; real processes, whose answers are known beforehand."""
     robots, right = ["planar_two_link", "double_pendulum", "<robot/>", "iris_simple"], answer.answer
 

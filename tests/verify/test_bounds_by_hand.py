@@ -200,9 +200,7 @@ def test_mujocos_levers_are_twice_as_long_and_its_roundings_two_and_a_half_times
     assert size.roundings == 2.0 * 30.0 * JOINTS
 
 
-def test_an_imus_reading_has_an_accelerations_factors_in_its_own_axes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_imus_reading_has_an_accelerations_factors_in_own_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     found: list[tuple[FloatArray, int, Magnitudes, Reference]] = []
 
     def asked(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference) -> Bound:

@@ -205,9 +205,7 @@ def test_what_pinocchio_refuses_mujoco_may_check() -> None:
 
 
 @pytest.mark.parametrize("quantity", ["placement", "jacobian", "velocity"])
-def test_a_disagreement_with_mujoco_is_raised_in_its_name(
-    quantity: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disagreement_with_mujoco_bears_its_name(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     method = {"velocity": "velocities"}.get(quantity, f"{quantity}s")
     right = getattr(MujocoOracle, method)
     monkeypatch.setattr(MujocoOracle, method, lambda *given: right(*given) + 1e-9)

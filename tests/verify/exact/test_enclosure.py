@@ -148,9 +148,7 @@ SLIPS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("equation", SLIPS)
-def test_what_a_wrong_equation_gives_leaves_the_interval(
-    equation: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wrong_equations_leave_the_interval(equation: str, monkeypatch: pytest.MonkeyPatch) -> None:
     robot, (term, quantity) = robot_of("panda"), SLIPS[equation]
     x, frame = sample(robot), robot.tip_frame
     monkeypatch.setattr(recursion._RECURSION, "eq", with_a_slip(equation, term))
