@@ -57,16 +57,14 @@ def step(draw: st.DrawFn, tame: bool = False) -> FloatArray:
     length = tame_length if tame else any_length
     relation = draw(st.sampled_from(RELATIONS[:TAME] if tame else RELATIONS))
     a, tilt = draw(length), 0.0
-    if relation == "skew":
+    if relation in ("meeting", "collinear"):
+        a = 0.0
+    if relation in ("skew", "meeting"):
         tilt = draw(st.floats(0.1, 3.0))
     elif relation == "square":
         tilt = draw(st.sampled_from([math.pi / 2, -math.pi / 2]))
-    elif relation == "meeting":
-        a, tilt = 0.0, draw(st.floats(0.1, 3.0))
     elif relation == "antiparallel":
         tilt = math.pi
-    elif relation == "collinear":
-        a = 0.0
     elif relation == "near":
         tilt = draw(tiny)
     elif relation == "near-anti":

@@ -23,15 +23,11 @@ def test_another_figure_gives_another_page() -> None:
 
 
 def test_the_first_table_tells_all_threads_from_code_compiled_for_one_robot() -> None:
-    batch = {
-        (f"{row['robot']}, {row['quantity']}", row["who"]): row["ratio"]
-        for row in FIGURES["rows"]
-        if row["section"] == "batch"
-    }
+    rows = [row for row in FIGURES["rows"] if row["section"] == "batch"]
+    batch = {(f"{row['robot']}, {row['quantity']}", row["who"]): row["ratio"] for row in rows}
     (summary,) = [words for words in tables(FIGURES) if words.section == "summary"]
-    threads, compiled = (
-        next(i for i, head in enumerate(summary.head) if word in head) for word in ("all threads", "compiled")
-    )
+    heads = list(enumerate(summary.head))
+    threads, compiled = (next(i for i, head in heads if word in head) for word in ("all threads", "compiled"))
     several = f"urdfkin, {FIGURES['machine']['processors']} threads"
     for row in summary.rows:
         assert row[threads] == number(batch[row[0], several])

@@ -337,9 +337,7 @@ NAMED: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("given", NAMED)
-def test_a_name_read_as_another_coordinate_is_a_disagreement(
-    given: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_name_read_as_another_coordinate_disagrees(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load(ARM)
     robot.placement(NAMED[given], "e")
     assert robot.certificate().verified

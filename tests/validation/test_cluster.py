@@ -121,9 +121,7 @@ def test_nothing_of_a_local_cluster_lies_where_another_user_could_have_put_it(
     assert [place.name for place in tmp_path.iterdir()] == ["dask-scratch-space"]
 
 
-def test_a_process_of_ours_takes_no_module_from_dasks_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_process_takes_a_module_from_dasks_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As a worker on a real cluster has it, where Dask has put it on the path before urdfkin is there."""
     for folder in ("dask-scratch-space", "dask-scratch-space-1000/worker-x"):
         (tmp_path / folder).mkdir(parents=True)
@@ -340,9 +338,7 @@ def test_workers_may_come_and_go(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(counts) >= 1
 
 
-def test_another_version_is_refused_before_anything_is_sent(
-    two: Cluster, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_version_is_refused_before_any_work(two: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     other = provenance() | {"pin": "3.0.0", "code": "0" * 64}
     monkeypatch.setattr(cluster, "provenance", lambda: other)
     words = r"different versions of the code: found pin 4\S* on the cluster and 3"
