@@ -41,10 +41,6 @@ def frame(i: int) -> MovingFrame:
     """Frame i + 1 in frame i at that moment, its rates differentiated at 60 digits."""
     R, d = ORIENTATIONS[i], ORIGINS[i]
     return MovingFrame(
-        array(R(mp.mpf(T))),
-        array(d(mp.mpf(T))),
-        array(angular_velocity(R, T)),
-        array(rate(d, T)),
-        array(angular_acceleration(R, T)),
-        array(second_rate(d, T)),
-    )
+        array(R(mp.mpf(T))), array(d(mp.mpf(T))), array(angular_velocity(R, T)), array(rate(d, T)),
+        array(angular_acceleration(R, T)), array(second_rate(d, T)),
+    )  # fmt: skip

@@ -26,13 +26,10 @@ class TreeOracle:
             carrier, placement = poses[joint.parent]
             here = placement * pin.SE3(joint.T_parent_joint)
             if joint.kind is not JointKind.FIXED:
-                kind = (
-                    pin.JointModelRevoluteUnaligned if joint.kind.turns else pin.JointModelPrismaticUnaligned
-                )
-                carrier, here = (
-                    self.model.addJoint(carrier, kind(joint.axis), here, joint.name),
-                    pin.SE3.Identity(),
-                )
+                turns = joint.kind.turns
+                kind = pin.JointModelRevoluteUnaligned if turns else pin.JointModelPrismaticUnaligned
+                carrier = self.model.addJoint(carrier, kind(joint.axis), here, joint.name)
+                here = pin.SE3.Identity()
                 self.slots.append(carrier)
             poses.append((carrier, here))
         for name, (carrier, here) in zip(tree.links, poses, strict=True):

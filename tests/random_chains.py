@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -13,16 +14,8 @@ TURNS = np.array([0.0, math.pi / 2, math.pi, -math.pi / 2])
 
 #: How the next axis stands to the one before it.
 RELATIONS = (
-    "skew",
-    "square",
-    "meeting",
-    "parallel",
-    "antiparallel",
-    "collinear",
-    "near",
-    "near-anti",
-    "coaxial-ish",
-)
+    "skew", "square", "meeting", "parallel", "antiparallel", "collinear", "near", "near-anti", "coaxial-ish",
+)  # fmt: skip
 
 #: How many of them, from the first, have no tiny tilts or offsets.
 TAME = 6
@@ -44,6 +37,13 @@ def rotation(axis: str, angle: float) -> FloatArray:
     return T
 
 
+def z_joint(
+    name: str, T: FloatArray | None = None, kind: JointKind = JointKind.REVOLUTE, **more: Any
+) -> Joint:
+    """A joint with its axis along z, at T in its parent; `more` are its limit and its rule."""
+    return Joint(name, kind, 0, np.eye(4) if T is None else T, np.array([0.0, 0.0, 1.0]), **more)
+
+
 def shift(x: float, y: float, z: float) -> FloatArray:
     """(4, 4) translation."""
     T = np.eye(4)
@@ -57,16 +57,14 @@ def step(draw: st.DrawFn, tame: bool = False) -> FloatArray:
     length = tame_length if tame else any_length
     relation = draw(st.sampled_from(RELATIONS[:TAME] if tame else RELATIONS))
     a, tilt = draw(length), 0.0
-    if relation == "skew":
+    if relation in ("meeting", "collinear"):
+        a = 0.0
+    if relation in ("skew", "meeting"):
         tilt = draw(st.floats(0.1, 3.0))
     elif relation == "square":
         tilt = draw(st.sampled_from([math.pi / 2, -math.pi / 2]))
-    elif relation == "meeting":
-        a, tilt = 0.0, draw(st.floats(0.1, 3.0))
     elif relation == "antiparallel":
         tilt = math.pi
-    elif relation == "collinear":
-        a = 0.0
     elif relation == "near":
         tilt = draw(tiny)
     elif relation == "near-anti":

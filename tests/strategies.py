@@ -21,22 +21,16 @@ angles = st.one_of(
 #: Names of every script, with everything that XML must escape; none that looks like xacro,
 #: which the checks refuse.
 names = st.text(
-    st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn", "Co")),
-    min_size=1,
-    max_size=8,
+    st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn", "Co")), min_size=1, max_size=8
 ).filter(lambda name: "${" not in name)
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
     """Rz(yaw) Ry(pitch) Rx(roll), by itself: not the code under test."""
     (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    x = [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr]
+    y = [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr]
+    return np.array([x, y, [-sp, cp * sr, cp * cr]])
 
 
 rotations = st.builds(rotation, angles, angles, angles)
@@ -54,9 +48,8 @@ def poses(draw: st.DrawFn) -> FloatArray:
 @st.composite
 def axes(draw: st.DrawFn) -> FloatArray:
     """(3,) unit vectors, those along a coordinate axis included."""
-    vector = np.array(
-        draw(st.sampled_from([(0, 0, 1), (1, 0, 0), (0, -1, 0), None])) or draw(st.tuples(*[lengths] * 3))
-    )
+    coordinate_axis = draw(st.sampled_from([(0, 0, 1), (1, 0, 0), (0, -1, 0), None]))
+    vector = np.array(coordinate_axis or draw(st.tuples(*[lengths] * 3)))
     length = float(np.linalg.norm(vector))
     return np.array([0.0, 0.0, 1.0]) if length < 1e-6 else vector / length
 
@@ -88,9 +81,8 @@ def trees(draw: st.DrawFn, *, max_joints: int = 8, kinds: tuple[JointKind, ...] 
         leaders = [joint.name for joint, _, _ in rows if joint.kind in AXIAL and joint.mimic is None]
         mimic = None
         if kind in AXIAL and leaders and draw(st.integers(0, 3)) == 0:
-            mimic = Mimic(
-                draw(st.sampled_from(leaders)), draw(st.floats(-2.0, 2.0)), draw(st.floats(-1.0, 1.0))
-            )
+            leader = draw(st.sampled_from(leaders))
+            mimic = Mimic(leader, draw(st.floats(-2.0, 2.0)), draw(st.floats(-1.0, 1.0)))
         axis = draw(axes()) if kind.has_axis else np.array([1.0, 0.0, 0.0])
         joint = Joint(name, kind, 0, draw(poses()), axis, limit=draw(limits(kind)), mimic=mimic)
         rows.append((joint, links[draw(st.integers(0, number))], links[number + 1]))

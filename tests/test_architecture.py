@@ -52,16 +52,13 @@ def test_no_modules_import_each_other_in_a_cycle() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "import urdfkin.robot",
-        "from urdfkin import robot",
-        "from urdfkin.robot import Robot",
+        "import urdfkin.robot", "from urdfkin import robot", "from urdfkin.robot import Robot",
         "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from urdfkin.robot import Robot",
         "def f():\n    from urdfkin.robot import Robot",
-        "try:\n    pass\nfinally:\n    import urdfkin.robot as r",
-        "import_module('urdfkin.robot')",
+        "try:\n    pass\nfinally:\n    import urdfkin.robot as r", "import_module('urdfkin.robot')",
         "ROW = ('robot', 'urdfkin.robot:Robot.sample')",
     ],
-)
+)  # fmt: skip
 def test_every_form_of_import_counts(text: str) -> None:
     assert {"urdfkin.robot", "urdfkin.robot.Robot", "urdfkin.robot.*"} & set(named(text))
 

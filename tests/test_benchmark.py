@@ -8,6 +8,7 @@ import sys
 import xml.dom.minidom
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from scripts.benchmarking.machine import EMPTY, KEPT, USES
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, bare_urdf, chain_urdf
 from scripts.benchmarking.tables import tables
 from scripts.benchmarking.timing import Calls, DifferenceError, Table, Work, agree, measure
+from tests.urdfs import joint, robot
 from urdfkin.compiled.plan import Step, program_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -32,27 +34,19 @@ def test_the_quick_benchmark_finds_equal_results_and_writes_every_section(tmp_pa
     file, picture = tmp_path / "figures.json", tmp_path / "figures.svg"
     command = [sys.executable, str(ROOT / "scripts/benchmark.py"), "--quick", "--json", str(file)]
     run = subprocess.run(
-        [*command, "--plot", str(picture)],
-        check=True,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-    )
+        [*command, "--plot", str(picture)], check=True, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+    )  # fmt: skip
     figures = json.loads(file.read_text())
-    assert {row["section"] for row in figures["rows"]} | {"memory", "where", "first"} == set(
-        benchmark.SECTIONS
-    )
+    shown = {row["section"] for row in figures["rows"]} | {"memory", "where", "first"}
+    assert shown == set(benchmark.SECTIONS)
     assert all(0 < row["minimum_ns"] <= row["median_ns"] for row in figures["rows"])
     batches = [row for row in figures["rows"] if row["section"] == "batch"]
-    assert {(row["robot"], row["quantity"]) for row in batches} == {
-        (robot, quantity) for robot, _ in SUBJECTS for quantity in QUANTITIES
-    }
+    pairs = {(robot, quantity) for robot, _ in SUBJECTS for quantity in QUANTITIES}
+    assert {(row["robot"], row["quantity"]) for row in batches} == pairs
     assert all(entry["peak_bytes"] >= 0.9 * entry["output_bytes"] for entry in figures["memory"])
-    assert {entry["kind"]: entry["robot"] for entry in figures["where"]} == {
-        "batch": "talos",
-        "single": "talos",
-    }
+    robots = {entry["kind"]: entry["robot"] for entry in figures["where"]}
+    assert robots == {"batch": "talos", "single": "talos"}
     assert all(0 < entry[KEPT] < entry[EMPTY] for entry in figures["first"])
     assert set(figures["libraries"]) == {contender.library for contender in (*ALWAYS, *PEERS)}
     assert [words.title for words in tables(figures) if words.title not in run.stdout] == []
@@ -63,13 +57,8 @@ def test_the_quick_benchmark_finds_equal_results_and_writes_every_section(tmp_pa
 def test_a_wrong_number_fails_the_run_and_names_who_has_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    right = Robot.jacobian
-
-    def wrong(self: Robot, *arguments: object, **options: object) -> FloatArray:
-        J = right(self, *arguments, **options)  # type: ignore[arg-type]
-        return J + 1e-8
-
-    monkeypatch.setattr(Robot, "jacobian", wrong)
+    right: Any = Robot.jacobian
+    monkeypatch.setattr(Robot, "jacobian", lambda *asked, **how: right(*asked, **how) + 1e-8)
     assert benchmark.main(["--quick", "--no-peers", "--only", "single"]) == 1
     message = capsys.readouterr().err
     assert "panda, single jacobian: urdfkin, robot.jacobian(verify=False)" in message
@@ -115,9 +104,7 @@ def test_a_library_or_a_program_that_is_missing_is_listed_and_left_out() -> None
 
 
 @pytest.mark.parametrize(("name", "frame"), [*SUBJECTS, ("polar", "slider")])
-def test_the_path_written_out_for_one_robot_has_the_robots_jacobian_and_acceleration(
-    name: str, frame: str
-) -> None:
+def test_the_path_written_out_for_a_robot_has_its_jacobian_and_acceleration(name: str, frame: str) -> None:
     with Subject(name, frame, 1) as subject:
         q, v, a = subject.q[0], subject.v[0], subject.a[0]
         of_q, of_v = (subject.plan.steps[:, place] for place in (Step.Q, Step.V))
@@ -133,9 +120,7 @@ def test_the_path_written_out_for_one_robot_has_the_robots_jacobian_and_accelera
 @pytest.mark.long
 @pytest.mark.skipif(shutil.which(generated.COMPILER) is None, reason="no C compiler")
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_code_generated_for_one_robot_computes_what_the_robot_does_and_writes_nothing_else(
-    quantity: str,
-) -> None:
+def test_code_generated_for_a_robot_computes_what_it_does_and_writes_nothing_else(quantity: str) -> None:
     pytest.importorskip("casadi")
     with Subject("polar", "slider", 17) as subject:
         compute = generated.compiled(subject, quantity)
@@ -157,11 +142,8 @@ def test_a_batch_taken_apart_is_whole_when_nothing_is_left_out(quantity: str) ->
         lengths = [len(part.words) for part in sizes]
         assert lengths == sorted(lengths)
         assert lengths[0] < lengths[-1]
-        (entry,) = [
-            entry
-            for entry in sections.parts_of_batches(100, 1)
-            if (entry["robot"], entry["quantity"]) == (subject.name, quantity)
-        ]
+        parts = {(x["robot"], x["quantity"]): x for x in sections.parts_of_batches(100, 1)}
+        entry = parts[subject.name, quantity]
         assert ("columns" in entry["parts"]) == (quantity == "jacobian")
         assert sum(entry["parts"].values()) == pytest.approx(entry["ns"], abs=0.05)
 
@@ -213,12 +195,9 @@ def test_a_loop_stores_what_single_calls_return_and_turns_the_order_round() -> N
 
 
 def test_breadth_first_goes_link_after_link_in_the_files_order() -> None:
-    joints = [("shoulder", "base", "upper"), ("wrist", "upper", "hand"), ("neck", "base", "head")]
-    body = "".join(
-        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/></joint>'
-        for name, parent, child in joints
-    )
-    assert breadth_first(f'<robot name="x">{body}</robot>') == ["shoulder", "neck", "wrist"]
+    rows = ("shoulder", "base", "upper"), ("wrist", "upper", "hand"), ("neck", "base", "head")
+    text = robot(*(joint(name, "revolute", *links) for name, *links in rows))
+    assert breadth_first(text) == ["shoulder", "neck", "wrist"]
 
 
 def test_columns_come_to_their_places_by_name() -> None:

@@ -41,11 +41,10 @@ def test_a_stopped_run_in_a_library_continues_with_the_files_that_are_left(
 ) -> None:
     robot, keep = urdfkin.load("planar_two_link"), tmp_path / "jax.jsonl"
     monkeypatch.setattr(check_exports, "subjects", lambda tips: iter([("arm", robot, "tip")]))
-    kept = [
-        {"file": "planar_two_link_tip_0_jax", "library": "jax", "share": 0.5},
-        {"file": "planar_two_link_tip_0_array", "library": "torch", "share": 7.0},
-    ]
-    keep.write_text("".join(f"{json.dumps(line)}\n" for line in kept), encoding="utf-8")
+    for to, library, share in (("jax", "jax", 0.5), ("array", "torch", 7.0)):
+        line = {"file": f"planar_two_link_tip_0_{to}", "library": library, "share": share}
+        with keep.open("a", encoding="utf-8") as file:
+            file.write(f"{json.dumps(line)}\n")
     assert check_exports.check_library("jax", environment(tmp_path, 0.9), None, keep) == 0
     assert (tmp_path / "ran").read_text("utf-8").split() == ["planar_two_link_tip_0_array"]
     assert len(check_exports.lines_of(keep)) == 3

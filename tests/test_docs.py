@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ import urdfkin
 from scripts import check_exports, make_pages, measure_size
 from scripts.benchmarking.operations import operations
 from scripts.pages import inserted
+from tests import urdfs
 from tests.cli.running import urdfkin as run
 from tests.pages import pages
 from tests.reading import present
@@ -37,14 +39,11 @@ def commands() -> list[tuple[str, str]]:
     found = []
     for page in PAGES:
         text = (ROOT / page).read_text("utf-8")
-        blocks = (
-            re.findall(r"```(?:sh|console)\n(.*?)```", text, re.DOTALL) if page.endswith(".md") else [text]
-        )
-        for block in blocks:
+        shown = re.findall(r"```(?:sh|console)\n(.*?)```", text, re.DOTALL)
+        for block in shown if page.endswith(".md") else [text]:
             joined = re.sub(r">\n\s+(urdfkin [^\n]*)\n\s+--", r"\1 --", block)
-            found += [
-                (page, words) for words in re.findall(r"(?:\$ |run: |^\s*)(urdfkin \w[^#\n]*)", joined, re.M)
-            ]
+            lines = re.findall(r"(?:\$ |run: |^\s*)(urdfkin \w[^#\n]*)", joined, re.M)
+            found += [(page, words) for words in lines]
     return found
 
 
@@ -71,21 +70,16 @@ def test_links_lead_to_files_and_headings(page: str) -> None:
         file, _, anchor = target.partition("#")
         there = (ROOT / page).parent / file if file else ROOT / page
         assert there.exists(), target
-        heads = [
-            re.sub(r"[^a-z0-9 -]", "", head.lower()).replace(" ", "-")
-            for head in (re.findall(r"^#+ (.*)", there.read_text(), re.M) if there.suffix == ".md" else ())
-        ]
-        assert not anchor or anchor in heads, target
+        heads = re.findall(r"^#+ (.*)", there.read_text(), re.M) if anchor else []
+        anchors = [re.sub(r"[^a-z0-9 -]", "", head.lower()).replace(" ", "-") for head in heads]
+        assert not anchor or (there.suffix == ".md" and anchor in anchors), target
 
 
 def test_every_script_that_writes_a_page_is_run_by_make_docs() -> None:
     target = re.findall(r"^docs:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text("utf-8"), re.M)[0]
     run_by_make = set(re.findall(r"python scripts/(\w+)\.py", target))
-    writers = {
-        path.stem
-        for path in (ROOT / "scripts").glob("*.py")
-        if re.search(r"PAGE\.write_text|insert\(PAGE", path.read_text("utf-8"))
-    }
+    texts = {path.stem: path.read_text("utf-8") for path in (ROOT / "scripts").glob("*.py")}
+    writers = {name for name, text in texts.items() if re.search(r"PAGE\.write_text|insert\(PAGE", text)}
     makers = {path.stem for path in (ROOT / "scripts").glob("make_*.py")}
     assert run_by_make == writers | makers - {"make_pictures"}  # photographs need a browser
 
@@ -126,18 +120,17 @@ def plain(text: str) -> str:
 
 
 def test_what_a_validation_compares_is_said_as_the_table_of_quantities_has_it() -> None:
-    validate = present(
-        cli.get_command(cli.make_context("urdfkin", ["--help"], resilient_parsing=True), "validate")
-    )
-    assert validate.help is not None
+    group = cli.make_context("urdfkin", ["--help"], resilient_parsing=True)
+    shown = plain(present(present(cli.get_command(group, "validate")).help))
     template = (ROOT / "urdfkin/report/templates/report.html.j2").read_text("utf-8")
     assert "{{ compared }}" in template
     assert "{{ not_compared }}" in template
-    for page in ("docs/commands.md", "docs/ci.md"):
-        assert compared() in plain((ROOT / page).read_text("utf-8")), page
-        assert not_compared() in plain((ROOT / page).read_text("utf-8")), page
-    assert compared() in plain(validate.help)
-    assert not_compared() in plain(validate.help)
+    for text in (
+        shown,
+        *(plain((ROOT / page).read_text("utf-8")) for page in ("docs/commands.md", "docs/ci.md")),
+    ):
+        assert compared() in text, text
+        assert not_compared() in text, text
     assert not_compared() in plain((ROOT / "docs/known-limits.md").read_text("utf-8"))
     named = [row for row in QUANTITIES.values() if row.of == "frames"]
     assert {row.title for row in named} == {*re.split(", | and ", f"{compared()}, {not_compared()}")}
@@ -145,10 +138,8 @@ def test_what_a_validation_compares_is_said_as_the_table_of_quantities_has_it() 
 
 def test_no_page_says_that_a_validation_compares_every_quantity() -> None:
     texts = [ROOT / page for page in PAGES] + sorted((ROOT / "urdfkin").rglob("*.py"))
-    claims = [
-        path for path in texts if re.search(r"(?i)every quantity (of every|but the)", path.read_text("utf-8"))
-    ]
-    assert claims == []
+    claim = re.compile(r"(?i)every quantity (of every|but the)")
+    assert [path for path in texts if claim.search(path.read_text("utf-8"))] == []
 
 
 def test_the_exit_status_without_a_robot_is_the_tables() -> None:
@@ -157,9 +148,7 @@ def test_the_exit_status_without_a_robot_is_the_tables() -> None:
 
 
 def test_the_guide_and_the_finding_name_the_same_size() -> None:
-    (size,) = re.findall(
-        r"URDF604, a robot (smaller than .*):", (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    )
+    (size,) = re.findall(r"URDF604, a robot (smaller than .*):", GUIDE)
     assert size in run("explain", "URDF604").text
 
 
@@ -196,9 +185,8 @@ def test_every_file_that_the_guide_names_is_there() -> None:
 
 
 def test_every_target_that_the_guide_names_is_one() -> None:
-    lines = re.findall(
-        r"`?make ((?:[a-z]+ ?)+)", "\n".join(re.findall(r"^make .*|`make .*?`", GUIDE, re.MULTILINE))
-    )
+    shown = "\n".join(re.findall(r"^make .*|`make .*?`", GUIDE, re.MULTILINE))
+    lines = re.findall(r"`?make ((?:[a-z]+ ?)+)", shown)
     named = {word for line in lines for word in line.split()}
     assert {"setup", "fast", "test"} <= named <= TARGETS
 
@@ -212,9 +200,8 @@ def test_make_understands_its_file() -> None:
 def test_ci_runs_two_commands_that_pass_every_test_between_them() -> None:
     scripts = re.findall(r"^\./(scripts/\S+)$", (ROOT / ".ci/run").read_text("utf-8"), re.MULTILINE)
     assert scripts == ["scripts/test.sh", "scripts/test_long.sh"]
-    chosen = [
-        re.findall(r'pytest .*-m ("[^"]+"|\w+) "\$@"', (ROOT / name).read_text("utf-8")) for name in scripts
-    ]
+    texts = ((ROOT / name).read_text("utf-8") for name in scripts)
+    chosen = [re.findall(r'pytest .*-m ("[^"]+"|\w+) "\$@"', text) for text in texts]
     assert chosen == [['"not long"'], ["long"]]
 
 
@@ -264,19 +251,15 @@ def test_cudas_compiler_is_installed_only_if_it_compiles(pip: int, status: int, 
 
 @pytest.mark.parametrize("installs", [True, False])
 @pytest.mark.parametrize("ci", ["true", ""])
-def test_the_long_tests_run_also_if_cudas_compiler_does_not_install(
-    ci: str, installs: bool, tmp_path: Path
-) -> None:
+def test_long_tests_run_if_cudas_compiler_does_not_install(ci: str, installs: bool, tmp_path: Path) -> None:
     shutil.copy(ROOT / "scripts/test_long.sh", tmp_path)
     functions = f"install_nvcc() {{ echo nvcc; return {int(not installs)}; }}"
     (tmp_path / "environment.sh").write_text(f"make_environment() {{ :; }}\n{functions}\n", encoding="utf-8")
     for name in ("urdfkin", "pytest"):
         (tmp_path / name).write_text(f"#!/bin/sh\necho {name}\n", encoding="utf-8")
         (tmp_path / name).chmod(0o755)
-    environment = {"PATH": f"{tmp_path}:/usr/bin:/bin", "CI": ci}
-    done = subprocess.run(
-        [tmp_path / "test_long.sh"], env=environment, capture_output=True, text=True, check=True
-    )
+    how: dict[str, Any] = {"env": {"PATH": f"{tmp_path}:/usr/bin:/bin", "CI": ci}, "text": True}
+    done = subprocess.run([tmp_path / "test_long.sh"], capture_output=True, check=True, **how)
     assert done.stdout.split() == [*(["nvcc"] if ci else []), "urdfkin", "pytest"]
     assert ("CUDA's compiler was not installed" in done.stderr) == bool(ci and not installs)
 
@@ -303,10 +286,7 @@ def counted(name: str, frame: str, quantity: str) -> int:
 
 
 def test_one_joint_about_z_at_the_origin_costs_what_one_counts_by_hand() -> None:
-    text = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
-      <parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>"""
-    robot = urdfkin.load(text)
-    plan = robot.plan([1])
+    plan = urdfkin.load(urdfs.robot(urdfs.joint("j", "continuous", "a", "b"))).plan([1])
     # Sine and cosine 51. R Rz: three rows of two numbers, each two products and a sum: 18. The column: p - o
     # 3 and z x d 9, and nothing else.
     assert operations(plan, "jacobian") == 51 + 18 + 12
@@ -317,10 +297,7 @@ def test_one_joint_about_z_at_the_origin_costs_what_one_counts_by_hand() -> None
 
 
 def test_what_is_not_asked_for_is_not_counted() -> None:
-    for name, frame in (
-        ("panda", "panda_hand"),
-        ("talos", "gripper_left_base_link"),
-        ("panda", "panda_leftfinger"),
-    ):
+    hands = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), ("panda", "panda_leftfinger")
+    for name, frame in hands:
         velocity, acceleration = (counted(name, frame, quantity) for quantity in ("velocity", "acceleration"))
         assert velocity < acceleration < 2 * velocity

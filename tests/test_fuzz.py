@@ -18,7 +18,6 @@ from scripts.fuzzing.judge import judge as judge_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.urdf.lint.cases.arm import arm, fixed
 from urdfkin.compiled.prepared import PreparedFrame
-from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.system.processes import ask_python
 from urdfkin.urdf.records import FURTHER_LIMITS
 from urdfkin.verify import mjcf_check
@@ -38,12 +37,13 @@ def test_a_mutant_depends_on_seed_and_number_alone() -> None:
     assert mutants != [mutant(1, number, files) for number in range(50)]
 
 
-@pytest.mark.parametrize("family", robots.FAMILIES)
+@pytest.mark.parametrize("family", [*robots.FAMILIES, *mjcf.FAMILIES])
 def test_a_robot_depends_on_seed_family_and_number_alone(family: str) -> None:
-    made = [robots.robot(0, family, number) for number in range(20)]
+    robot = mjcf.robot if family in mjcf.FAMILIES else robots.robot
+    made = [robot(0, family, number) for number in range(20)]
     assert made == [fuzz.case(0, family, number) for number in range(20)]
     assert len({each.data for each in made}) > 17
-    assert made != [robots.robot(1, family, number) for number in range(20)]
+    assert made != [robot(1, family, number) for number in range(20)]
 
 
 def test_robots_are_of_every_oddity() -> None:
@@ -86,20 +86,17 @@ def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
     assert changed > 950
 
 
+_END = '<link name="end"/>' + fixed("e", "tool", "end").replace("</j", '<origin xyz="1 0 0"/></j')
+LARGE = arm(follow='<mimic joint="j1" multiplier="1e300"/>', more=_END)
+
+
 @pytest.mark.parametrize(
     ("text", "word"),
     [
         (arm(), "verified"),
         (arm(axis='<axis xyz="0 0 0"/>'), "refused"),
         (arm(origin='<origin xyz="0\t0 1"/>'), "not verified, with a finding that states the reason"),
-        (
-            arm(
-                follow='<mimic joint="j1" multiplier="1e300"/>',
-                more='<link name="end"/>'
-                + fixed("e", "tool", "end").replace("</j", '<origin xyz="1 0 0"/></j'),
-            ),
-            "too large to compute, with a finding that states the reason",
-        ),
+        (LARGE, "too large to compute, with a finding that states the reason"),
     ],
 )
 def test_the_judge_tells_what_happened(text: str, word: str) -> None:
@@ -122,9 +119,7 @@ def test_a_traceback_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert judge(arm()).word == "traceback: KeyError"
 
 
-def test_what_pinocchio_refuses_though_check_found_nothing_is_a_finding_of_its_own(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_only_pinocchio_refuses_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuses(*arguments: object, **options: object) -> None:
         raise ValueError("no reason")
 
@@ -137,12 +132,8 @@ def test_what_pinocchio_refuses_though_check_found_nothing_is_a_finding_of_its_o
 
 
 def test_numbers_that_differ_between_two_ways_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = PreparedFrame.velocity
-
-    def nudged(*arguments: object) -> FloatArray:
-        return np.nextafter(right(*arguments), 1.0)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(PreparedFrame, "velocity", nudged)
+    right: Any = PreparedFrame.velocity
+    monkeypatch.setattr(PreparedFrame, "velocity", lambda *asked: np.nextafter(right(*asked), 1.0))
     assert judge(arm()).word == "two computations of one result differ"
 
 
@@ -169,22 +160,14 @@ def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("family", robots.FAMILIES)
+@pytest.mark.parametrize("family", [*robots.FAMILIES, *mjcf.FAMILIES])
 def test_a_short_run_of_whole_robots_finds_nothing(family: str) -> None:
-    words = Counter(judge_case(robots.robot(20, family, number)).word for number in range(5))
+    words = Counter(judge_case(fuzz.case(20, family, number)).word for number in range(5))
     assert set(words) <= set(GOOD), words
     assert words["verified"] > 2
 
 
 # -- MJCF --------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("family", mjcf.FAMILIES)
-def test_an_mjcf_file_depends_on_seed_family_and_number_alone(family: str) -> None:
-    made = [mjcf.robot(0, family, number) for number in range(20)]
-    assert made == [fuzz.case(0, family, number) for number in range(20)]
-    assert len({each.data for each in made}) > 17
-    assert made != [mjcf.robot(1, family, number) for number in range(20)]
 
 
 def test_mjcf_files_are_of_every_oddity_and_mujoco_takes_them() -> None:
@@ -214,10 +197,3 @@ def test_a_reading_of_mjcf_that_is_not_mujocos_is_noticed(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(mjcf_check, "ask_python", without_shapes)
     assert judge(text).word == "MuJoCo reads another robot"
-
-
-@pytest.mark.parametrize("family", mjcf.FAMILIES)
-def test_a_short_run_of_mjcf_files_finds_nothing(family: str) -> None:
-    words = Counter(judge_case(mjcf.robot(20, family, number)).word for number in range(5))
-    assert set(words) <= set(GOOD), words
-    assert words["verified"] > 2

@@ -2,13 +2,13 @@
 
 import threading
 
-import numpy as np
 import pytest
 
 import urdfkin
+from tests.random_chains import shift, z_joint
 from tests.reading import tree_of
 from tests.urdfs import loaded
-from urdfkin.model.tree import Joint, JointKind, KinematicTree, build_tree, with_root_joint
+from urdfkin.model.tree import JointKind, KinematicTree, build_tree, with_root_joint
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
@@ -16,12 +16,8 @@ pytestmark = pytest.mark.slow
 
 
 def chain(count: int, kind: JointKind = JointKind.FIXED) -> KinematicTree:
-    T = np.eye(4)
-    T[0, 3] = 0.5
-    joints = [
-        (Joint(f"j{i}", kind, 0, T, np.array([0.0, 0.0, 1.0])), f"l{i}", f"l{i + 1}") for i in range(count)
-    ]
-    return build_tree("chain", "l0", joints)
+    joints = ((z_joint(f"j{i}", shift(0.5, 0, 0), kind), f"l{i}", f"l{i + 1}") for i in range(count))
+    return build_tree("chain", "l0", [*joints])
 
 
 @pytest.mark.slow

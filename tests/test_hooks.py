@@ -26,14 +26,9 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("hatchling", "click")
 #: What a build needs of the repository.
 SOURCES = (
-    "pyproject.toml",
-    "README.md",
-    "LICENSE",
-    ".pre-commit-hooks.yaml",
-    "urdfkin",
-    "robots",
+    "pyproject.toml", "README.md", "LICENSE", ".pre-commit-hooks.yaml", "urdfkin", "robots",
     "docs/questions.md",
-)
+)  # fmt: skip
 
 LONG = """<robot name="r"><link name="a"/><link name="b"/>
   <joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>
@@ -59,11 +54,8 @@ def wheel(name: str, folder: Path) -> None:
     assert tag.endswith("-none-any"), name
     stem = f"{name.replace('-', '_')}-{found.version}"
     skipped = ("INSTALLER", "REQUESTED", "RECORD", "direct_url.json")
-    files = [
-        file
-        for file in found.files or ()
-        if ".." not in file.parts and "__pycache__" not in file.parts and file.name not in skipped
-    ]
+    owned = (file for file in found.files or () if not {"..", "__pycache__"} & {*file.parts})
+    files = [file for file in owned if file.name not in skipped]
     info = next(file.parts[0] for file in files if file.parts[0].endswith(".dist-info"))
     with zipfile.ZipFile(folder / f"{stem}-{tag}.whl", "w") as archive:
         for file in files:
@@ -80,11 +72,10 @@ class Repository:
         self.run("git", "init", "-q")
 
     def run(self, *words: str, fails: bool = False) -> str:
-        done = subprocess.run(
-            words, cwd=self.folder, env=self.environ, capture_output=True, text=True, check=False
-        )
+        how: dict[str, Any] = {"cwd": self.folder, "env": self.environ, "capture_output": True, "text": True}
+        done = subprocess.run(words, check=False, **how)
         assert (done.returncode != 0) == fails, done.stdout + done.stderr
-        return done.stdout + done.stderr
+        return str(done.stdout + done.stderr)
 
     def commit(self, *, fails: bool = False) -> str:
         self.run("git", "add", "--all")
@@ -181,10 +172,8 @@ def steps() -> list[dict[str, Any]]:
 @pytest.fixture(scope="module")
 def runner(source: Repository) -> Repository:
     """A repository of robots on a machine where the action's first step has installed urdfkin."""
-    made = Repository(
-        source.folder.parent / "runner", source.environ | {"RUNNER_TEMP": str(source.folder.parent)}
-    )
-    made.environ |= {"PYTHON": sys.executable, "ACTION": str(source.folder)}
+    made, home = Repository(source.folder.parent / "runner", {**source.environ}), str(source.folder.parent)
+    made.environ |= {"RUNNER_TEMP": home, "PYTHON": sys.executable, "ACTION": str(source.folder)}
     (made.folder / "arm.urdf").write_text(LONG)
     made.commit()
     # What a stranger puts there is never run.

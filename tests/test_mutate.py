@@ -5,7 +5,9 @@ import hashlib
 import os
 import re
 import sys
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -37,21 +39,12 @@ def f(x: "1 < 2", limit=3):
 '''
 
 WHAT = {
-    "x < limit  ->  x <= limit",
-    "x < limit and (not x)  ->  x < limit or not x",
-    "not x  ->  not not x",
-    "3  ->  4",
-    "raise ValueError('x < 3')  ->  pass",
-    "-2  ->  +2",
-    "2  ->  3",
-    "if done(x)  ->  if not done(x)",
-    "continue  ->  break",
-    "log(y)  ->  None",
-    "min  ->  max",
-    "1.5  ->  2.25",
-    "True  ->  False",
+    "x < limit  ->  x <= limit", "x < limit and (not x)  ->  x < limit or not x", "not x  ->  not not x",
+    "3  ->  4", "raise ValueError('x < 3')  ->  pass", "-2  ->  +2", "2  ->  3",
+    "if done(x)  ->  if not done(x)", "continue  ->  break", "log(y)  ->  None", "min  ->  max",
+    "1.5  ->  2.25", "True  ->  False",
     "min(x, 1.5) if ready else True  ->  min(x, 1.5) if not ready else True",
-}
+}  # fmt: skip
 
 
 def test_every_kind_of_slip_is_made_once_and_nothing_that_does_not_run_is_touched() -> None:
@@ -92,9 +85,8 @@ def test_every_slip_of_the_package_compiles_and_has_a_test_to_ask() -> None:
 def test_what_no_test_looks_at_survives_and_what_one_does_is_noticed(
     what: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (mutant,) = [
-        m for m in mutants(["verify/certificate"]) if m.what == what and m.place.endswith("Comparison.agrees")
-    ]
+    places = [m for m in mutants(["verify/certificate"]) if m.place.endswith("Comparison.agrees")]
+    (mutant,) = [m for m in places if m.what == what]
     test = tmp_path / "test_one.py"
     test.write_text(
         "from urdfkin.verify.certificate import Comparison\n"
@@ -115,11 +107,8 @@ SEED = int(os.environ.get("URDFKIN_MUTATION_SEED", "1"))
 
 def drawn(count: int) -> list[Mutant]:
     """Return the mutants with the smallest hashes: a change elsewhere in a file draws no others."""
-
-    def rank(mutant: Mutant) -> str:
-        return hashlib.sha256(f"{SEED} {mutant.place} {mutant.what}".encode()).hexdigest()
-
-    return sorted(mutants(PARTS), key=rank)[:count]
+    named = {f"{SEED} {mutant.place} {mutant.what}".encode(): mutant for mutant in mutants(PARTS)}
+    return [named[name] for name in sorted(named, key=lambda name: hashlib.sha256(name).hexdigest())[:count]]
 
 
 @pytest.mark.long
@@ -157,16 +146,10 @@ def test_a_part_that_does_not_exist_is_an_error_and_named(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
-    [
-        ["--only", "urdfkin.validation.error_stats:99999"],
-        ["cli/__init__", "--named"],
-        ["cli/view", "--sample", "0"],
-    ],
+    ["--only urdfkin.validation.error_stats:99999", "cli/__init__ --named", "cli/view --sample 0"],
 )
-def test_no_mutant_at_all_is_a_failure(
-    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(sys, "argv", ["mutate.py", *words])
+def test_no_mutant_at_all_is_a_failure(words: str, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setattr(sys, "argv", ["mutate.py", *words.split()])
     assert main() == 1
     assert "no mutant was selected" in capsys.readouterr().err
 
@@ -175,11 +158,7 @@ def test_every_part_that_the_page_names_exists() -> None:
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     measured = re.findall(r"^\| `([\w/]+)` \|", page, re.M)
     commands = [line.split() for line in re.findall(r"scripts/mutate\.py (.*?)  ", page)]
-    named = [
-        word
-        for words in commands
-        for word in words[: next((i for i, w in enumerate(words) if w[0] == "-"), 9)]
-    ]
+    named = [word for words in commands for word in takewhile(lambda word: word[0] != "-", words)]
     assert len(measured) > 9
     assert len(named) > 2
     assert files(measured + named)

@@ -1,5 +1,6 @@
 """A number that is not finite is found wherever it stands, and its joint named, with a check and without."""
 
+import itertools
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -46,15 +47,12 @@ def panda() -> Robot:
 
 def spoiled(inputs: list[FloatArray], samples: tuple[int, ...]) -> Iterator[tuple[int, int, float]]:
     """Each place of some samples in turn; yields which input, which coordinate, and what stands there."""
-    turn = 0
-    for which, x in enumerate(inputs):
-        for sample in samples:
-            for coordinate in range(x.shape[-1]):
-                right, bad = x[sample, coordinate], BAD[turn % 3]
-                x[sample, coordinate] = bad
-                yield which, coordinate, bad
-                x[sample, coordinate] = right
-                turn += 1
+    places = ((i, sample, k) for i, x in enumerate(inputs) for sample in samples for k in range(x.shape[-1]))
+    for (which, sample, coordinate), bad in zip(places, itertools.cycle(BAD), strict=False):
+        x = inputs[which]
+        right, x[sample, coordinate] = x[sample, coordinate], bad
+        yield which, coordinate, bad
+        x[sample, coordinate] = right
 
 
 @pytest.mark.parametrize("verify", [True, False, "sample"])

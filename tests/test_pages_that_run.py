@@ -16,6 +16,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as urdfkin_command
 from tests.pages import DOCS, blocks, pages, run
+from tests.reading import present
 from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
 
@@ -87,16 +88,9 @@ def test_every_example_of_a_page_with_files_prints_what_it_shows(
     assert not Path("no.urdf").exists()
 
 
-SLOW = {"same.md": pytest.mark.slow}
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "page", [pytest.param(page, marks=SLOW.get(page, ())) for page in pages() if runs(page)]
-)
-def test_every_block_prints_what_stands_below_it(
-    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("page", [page for page in pages() if runs(page)])
+def test_each_block_prints_what_is_below(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with np.printoptions(), warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # examples of what is warned of
@@ -106,10 +100,8 @@ def test_every_block_prints_what_stands_below_it(
 
 @pytest.mark.parametrize("page", [page for page in ELSEWHERE if page in pages()])
 def test_a_page_that_is_run_elsewhere_is_named_there(page: str) -> None:
-    where = ELSEWHERE[page]
-    assert not where.startswith("tests/") or page.removesuffix(".md") in (DOCS.parent / where).read_text(
-        "utf-8"
-    )
+    where, name = ELSEWHERE[page], page.removesuffix(".md")
+    assert not where.startswith("tests/") or name in (DOCS.parent / where).read_text("utf-8")
 
 
 def rows(library: str) -> list[tuple[str, FloatArray]]:
@@ -125,10 +117,14 @@ def rows(library: str) -> list[tuple[str, FloatArray]]:
     return found
 
 
+def demand(asked: list[FloatArray], library: str) -> None:
+    """Demand that a library returns the numbers of its rows."""
+    for (call, numbers), theirs in zip(rows(library), asked, strict=True):
+        np.testing.assert_allclose(theirs, numbers, atol=1e-12, err_msg=call)
+
+
 def wheel() -> str:
-    text = re.search(r'"""(<robot.*?</robot>)"""', PAGE, re.DOTALL)
-    assert text is not None
-    return text[1]
+    return present(re.search(r'"""(<robot.*?</robot>)"""', PAGE, re.DOTALL))[1]
 
 
 def test_what_the_page_says_of_pinocchio_is_so() -> None:
@@ -143,20 +139,16 @@ def test_what_the_page_says_of_pinocchio_is_so() -> None:
         pin.getFrameAcceleration(model, data, frame, aligned).linear,
         *(rate[:3] for rate in rates),
     ]
-    said = rows("Pinocchio")
-    assert len(said) == len(asked)
-    for (call, numbers), theirs in zip(said, asked, strict=True):
-        np.testing.assert_allclose(theirs, numbers, atol=1e-12, err_msg=call)
+    demand(asked, "Pinocchio")
     (own,) = rows("urdfkin")
     np.testing.assert_allclose(urdfkin.load(wheel()).acceleration(Q, V, A, "bead")[:3], own[1], atol=1e-12)
 
 
 def test_what_the_page_says_of_mujoco_is_so() -> None:
     mujoco = pytest.importorskip("mujoco")
-    inertial = (
-        '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-    )
-    spec = mujoco.MjSpec.from_string(re.sub(r'(<link name="\w+")/>', rf"\1>{inertial}</link>", wheel()))
+    inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    link = rf'\1><inertial><mass value="1"/>{inertia}</inertial></link>'
+    spec = mujoco.MjSpec.from_string(re.sub(r'(<link name="\w+")/>', link, wheel()))
     spec.body("bead").add_site(name="bead")
     for name in ("FRAMELINACC", "ACCELEROMETER"):
         kind = getattr(mujoco.mjtSensor, f"mjSENS_{name}")
@@ -166,11 +158,7 @@ def test_what_the_page_says_of_mujoco_is_so() -> None:
     data.qpos[:], data.qvel[:], data.qacc[:] = Q, V, A
     mujoco.mj_inverse(model, data)
     mujoco.mj_jacDot(model, data, J_rate, None, data.site("bead").xpos, model.body("bead").id)
-    asked = [J_rate @ V, data.sensor("FRAMELINACC").data, data.sensor("ACCELEROMETER").data]
-    said = rows("MuJoCo")
-    assert len(said) == len(asked)
-    for (call, numbers), theirs in zip(said, asked, strict=True):
-        np.testing.assert_allclose(theirs, numbers, atol=1e-12, err_msg=call)
+    demand([J_rate @ V, data.sensor("FRAMELINACC").data, data.sensor("ACCELEROMETER").data], "MuJoCo")
 
 
 def table_rows(heading: str) -> list[list[str]]:

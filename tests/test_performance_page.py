@@ -23,15 +23,11 @@ def test_another_figure_gives_another_page() -> None:
 
 
 def test_the_first_table_tells_all_threads_from_code_compiled_for_one_robot() -> None:
-    batch = {
-        (f"{row['robot']}, {row['quantity']}", row["who"]): row["ratio"]
-        for row in FIGURES["rows"]
-        if row["section"] == "batch"
-    }
+    rows = [row for row in FIGURES["rows"] if row["section"] == "batch"]
+    batch = {(f"{row['robot']}, {row['quantity']}", row["who"]): row["ratio"] for row in rows}
     (summary,) = [words for words in tables(FIGURES) if words.section == "summary"]
-    threads, compiled = (
-        next(i for i, head in enumerate(summary.head) if word in head) for word in ("all threads", "compiled")
-    )
+    heads = list(enumerate(summary.head))
+    threads, compiled = (next(i for i, head in heads if word in head) for word in ("all threads", "compiled"))
     several = f"urdfkin, {FIGURES['machine']['processors']} threads"
     for row in summary.rows:
         assert row[threads] == number(batch[row[0], several])
@@ -62,12 +58,9 @@ def test_what_was_not_measured_is_said_to_be_missing() -> None:
 def test_the_page_shows_where_the_time_of_a_batch_and_of_a_single_call_goes() -> None:
     where = [
         {
-            "kind": kind,
-            "robot": "panda",
-            "quantity": "jacobian",
-            "ns": 40.0,
+            "kind": kind, "robot": "panda", "quantity": "jacobian", "ns": 40.0,
             "parts": {"walk": 10.0, "rest": 30.0},
         }
         for kind in ("batch", "single")
-    ]
+    ]  # fmt: skip
     assert page(TEXT, {**FIGURES, "where": where}).count("| walk | 10.0 (25 %) |") == 2

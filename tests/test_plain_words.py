@@ -39,9 +39,7 @@ def test_code_in_a_page_is_no_text(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert complaints([tmp_path]) == []
 
 
-def test_a_long_sentence_is_listed_and_a_short_one_is_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_long_sentence_is_listed_and_no_short_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain_words, "ROOT", tmp_path)
     (tmp_path / "page.md").write_text("Word " * 31 + ".\n" + "Word " * 20 + ".\n")
     (found,) = long_sentences([tmp_path])

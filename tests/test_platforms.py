@@ -44,9 +44,7 @@ def test_no_limit_of_memory_is_derived_where_the_system_states_none(
 
 
 @pytest.mark.parametrize("system", ["linux", "darwin"])
-def test_the_address_space_is_limited_where_the_system_can(
-    system: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_address_space_is_limited_if_the_system_can(system: str, monkeypatch: pytest.MonkeyPatch) -> None:
     limits: dict[int, tuple[int, int]] = {}
     monkeypatch.setattr(resource, "setrlimit", limits.__setitem__)
     monkeypatch.setattr(sys, "platform", system)

@@ -11,17 +11,21 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
+from tests.cli.running import good
 from tests.cli.running import urdfkin as run
 from tests.pages import DOCS
+from tests.urdfs import joint, limit, mimic
 from urdfkin.cli.explain import answer_to, answers, as_text
 from urdfkin.errors import Question, UrdfkinError
 from urdfkin.urdf import xacro
 from urdfkin.verify.pinocchio import _impostor
 
-WHEEL = """<robot name="wheel"><link name="a"/><link name="b"/><link name="c"/>
-<joint name="axle" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
-<joint name="cap" type="revolute"><parent link="b"/><child link="c"/><axis xyz="0 0 1"/>
-<limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="axle" multiplier="2"/></joint></robot>"""
+WHEEL = urdfs.robot(
+    joint("axle", "continuous", "a", "b"),
+    joint("cap", "revolute", "b", "c", more=limit(-9, 9) + mimic("axle", 2)),
+    name="wheel",
+)
 
 
 def _without_xacrodoc() -> object:
@@ -125,10 +129,9 @@ def _raise(error: Exception) -> None:
 def test_what_people_stumble_over_leads_to_a_section_that_stands_on_the_page(question: Question) -> None:
     for told in ASKED[question]:
         assert f"`urdfkin explain {question.value}`" in " ".join(told().split()).replace("- ", "-")
-    done = run("explain", question.value)
-    assert done.code == 0
-    assert len(done.text.splitlines()) > 3
-    assert "](" not in done.text
+    text = good("explain", question.value).text
+    assert len(text.splitlines()) > 3
+    assert "](" not in text
 
 
 def test_each_of_the_fifteen_pains_that_has_a_message_is_led_to_from_one() -> None:

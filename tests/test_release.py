@@ -78,16 +78,11 @@ def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_release_is_built_twice_checked_and_listed(dist: Path) -> None:
     name = f"urdfkin-{PROJECT['version']}"
     sums = (dist / "SHA256SUMS").read_text("utf-8").splitlines()
-    assert [line.split("  ")[1] for line in sums] == [
-        f"{name}.tar.gz",
-        f"{name}-py3-none-any.whl",
-        f"{name}.cdx.json",
-    ]
+    endings = (".tar.gz", "-py3-none-any.whl", ".cdx.json")
+    assert [line.split("  ")[1] for line in sums] == [f"{name}{ending}" for ending in endings]
     assert subprocess.run(["sha256sum", "-c", "SHA256SUMS"], cwd=dist, check=False).returncode == 0
-    listed = {
-        part["name"] for part in json.loads((dist / f"{name}.cdx.json").read_text("utf-8"))["components"]
-    }
-    assert {"numpy", "pin", "numba", "click"} <= listed
+    parts = json.loads((dist / f"{name}.cdx.json").read_text("utf-8"))["components"]
+    assert {"numpy", "pin", "numba", "click"} <= {part["name"] for part in parts}
 
 
 @pytest.mark.long
@@ -111,34 +106,24 @@ def installing() -> list[str]:
     """Return each `pip install` and `pip wheel` of the pages that names urdfkin or its clone."""
     texts = [(ROOT / "README.md").read_text("utf-8")]
     texts += [(ROOT / "docs" / page).read_text("utf-8") for page in pages() if page != "releasing.md"]
-    today = "\n".join(
-        line for text in texts for line in text.splitlines() if "After the first release" not in line
-    )
-    lines = re.findall(
-        r"(?<=- run: )pip .*$|^pip (?:install|wheel) .*$|(?<=`)pip install [^`]+", today, re.MULTILINE
-    )
-    return sorted({line for line in lines if re.search("urdfkin|PATH_OF_TH", line)})
+    lines = (line for text in texts for line in text.splitlines() if "After the first release" not in line)
+    shown = r"(?<=- run: )pip .*$|^pip (?:install|wheel) .*$|(?<=`)pip install [^`]+"
+    found = re.findall(shown, "\n".join(lines), re.MULTILINE)
+    return sorted({line for line in found if re.search("urdfkin|PATH_OF_TH", line)})
 
 
 def test_a_remedy_names_the_packages_of_the_extra() -> None:
     extras = PROJECT["optional-dependencies"]
-    assert {name: [package] for name, package in EXTRAS.items()} == {
-        name: packages for name, packages in extras.items() if name not in ("docs", "release", "test")
-    }
+    ours = {name: packages for name, packages in extras.items() if name not in ("docs", "release", "test")}
+    assert {name: [package] for name, package in EXTRAS.items()} == ours
     assert install_remedy("mujoco") == "pip install 'mujoco>=4,<5'"
 
 
 def test_no_message_installs_urdfkin_from_an_index() -> None:
     files = [file for file in (ROOT / "urdfkin").rglob("*") if file.suffix in (".py", ".toml", ".j2")]
     assert len(files) > 100
-    found = [
-        (file.name, words)
-        for file in files
-        for words in re.findall(
-            r"""pip install ['"]?urdfkin\W.*|install \W?urdfkin\[.*""", file.read_text("utf-8")
-        )
-    ]
-    assert found == []
+    line = re.compile(r"""pip install ['"]?urdfkin\W.*|install \W?urdfkin\[.*""")
+    assert {file.name: found for file in files if (found := line.findall(file.read_text("utf-8")))} == {}
 
 
 @pytest.fixture(scope="module")
@@ -160,18 +145,14 @@ def test_every_line_that_installs_urdfkin_works_today(lent: Path) -> None:
     assert len(lines) >= 5
     bin_ = lent / "env/bin"
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    environment |= {
-        "PIP_NO_INDEX": "1",
-        "PIP_NO_BUILD_ISOLATION": "0",
-        "PATH": f"{bin_}:{os.environ['PATH']}",
-    }
+    environment |= {"PIP_NO_INDEX": "1", "PIP_NO_BUILD_ISOLATION": "0"}
+    environment["PATH"] = f"{bin_}:{os.environ['PATH']}"
+    how: dict[str, Any] = {"cwd": lent, "env": environment, "capture_output": True, "text": True}
     for line in sorted(lines, key=lambda line: "dist/" in line):
         command = shlex.split(re.sub("PATH_OF_TH(E|IS)_CLONE", str(ROOT), line))
         for words in (command, ["urdfkin", "--version"], ["pip", "uninstall", "--yes", "urdfkin"]):
             if command[1] == "install" or words is command:
-                done = subprocess.run(
-                    words, cwd=lent, env=environment, capture_output=True, text=True, check=False
-                )
+                done = subprocess.run(words, check=False, **how)
                 assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
 
 
@@ -185,9 +166,7 @@ def test_without_yourdfpy_urdfkin_reads_its_files() -> None:
 
 
 def test_the_packages_that_only_yourdfpy_needs_are_not_in_the_line_that_avoids_them() -> None:
-    (line,) = (
-        line for line in (ROOT / "docs/install.md").read_text("utf-8").splitlines() if '"pin>=' in line
-    )
+    (line,) = re.findall(r'^.*"pin>=.*$', (ROOT / "docs/install.md").read_text("utf-8"), re.MULTILINE)
     named = {re.split("[<>=]", word)[0] for word in shlex.split(line)[2:]}
     needed = {re.split("[<>=]", need)[0] for need in PROJECT["dependencies"]}
     assert named == needed - {"yourdfpy"}

@@ -7,15 +7,17 @@ import re
 import shlex
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import urdfkin
 from tests import urdfs
+from tests.cli.running import good
 from tests.cli.running import urdfkin as command
 from tests.robots.odd_urdfs import urdf_of
-from tests.urdfs import joint
+from tests.urdfs import joint, limit
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.kinematics import roundings
 from urdfkin.kinematics.rotation import exp_rotation
@@ -58,11 +60,7 @@ def disagreement(robot: Robot, quantity: str, **base: BaseMotion) -> urdfkin.Ver
 def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(panda: Robot) -> None:
     error = disagreement(panda, "acceleration")
     assert error.is_disagreement
-    assert (error.quantity, error.frame, error.reference) == (
-        "acceleration",
-        "panda_hand_tcp",
-        "LOCAL",
-    )
+    assert (error.quantity, error.frame, error.reference) == ("acceleration", "panda_hand_tcp", "LOCAL")
     assert len(error.index) == 2
     assert error.ours.shape == error.theirs.shape == error.bound.shape == (6,)
     assert (np.abs(error.ours - error.theirs) > error.bound).any()
@@ -78,9 +76,7 @@ def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(p
 @pytest.mark.parametrize("quantity", METHODS)
 @pytest.mark.parametrize("root_joint", [None, "floating"])
 @pytest.mark.usefixtures("no_room")
-def test_its_line_computes_the_case_again(
-    quantity: str, root_joint: str | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_its_line_repeats_the_case(quantity: str, root_joint: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     error = disagreement(urdfkin.load("panda", root_joint=root_joint, mimic=False), quantity)
     words = shlex.split(error.reproduce)
     assert words[:3] == ["urdfkin", quantity.replace("_", "-"), "panda"]
@@ -88,16 +84,13 @@ def test_its_line_computes_the_case_again(
     assert again.code == 1
     assert f"the {error.quantity} of panda_hand_tcp" in again.err
     monkeypatch.undo()
-    result = command(*words[1:], "--format", "json")
-    assert result.code == 0
+    result = good(*words[1:], "--format", "json")
     # In lanes and alone the last digits may differ; the case is the same one.
     assert np.abs(np.array(result.data["result"][0]) - error.ours).max() < 1e-12
 
 
 @pytest.mark.usefixtures("no_room")
-def test_the_line_of_a_text_takes_it_from_standard_input_and_that_of_a_file_quotes_its_name(
-    tmp_path: Path,
-) -> None:
+def test_the_line_of_a_text_takes_it_from_standard_input_and_that_of_a_file_quotes_it(tmp_path: Path) -> None:
     text = urdf_of("odd_names")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
@@ -132,10 +125,7 @@ def test_the_certificate_counts_what_was_checked_and_says_what_was_not(panda: Ro
     panda.placement(q[:2], ["panda_hand", "panda_link3", "panda_link4"])
     certificate = panda.certificate()
     assert certificate.verified
-    assert {line.quantity: line.checked for line in certificate.lines} == {
-        "jacobian": 5,
-        "placement": 6,
-    }
+    assert {line.quantity: line.checked for line in certificate.lines} == {"jacobian": 5, "placement": 6}
     assert all(0.0 < line.worst < 100.0 and 0.0 < line.share < 1.0 for line in certificate.lines)
     assert certificate.oracle.startswith("Pinocchio 4.")
     panda.velocity(q, q, "panda_hand", verify=False)
@@ -160,16 +150,13 @@ def test_a_call_may_ask_for_the_check_that_the_robot_leaves_out() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "limit", "reason"),
-    [
-        ("universe", '<limit lower="-1" upper="1" effort="1" velocity="1"/>', "reads another robot"),
-        ("j", '<limit lower="-1" upper="1" effort="1" velocity="-1"/>', "refuses the file"),
-    ],
+    ("name", "velocity", "reason"), [("universe", 1, "reads another robot"), ("j", -1, "refuses the file")]
 )
 def test_what_pinocchio_cannot_check_is_handed_out_with_a_warning_and_never_as_verified(
-    name: str, limit: str, reason: str
+    name: str, velocity: int, reason: str
 ) -> None:
-    text = urdfs.robot(joint(name, "revolute", "a", "b", axis="", more=limit))
+    more = limit().replace('velocity="1"', f'velocity="{velocity}"')
+    text = urdfs.robot(joint(name, "revolute", "a", "b", axis="", more=more))
     with pytest.warns(urdfkin.UrdfWarning):
         robot = urdfkin.load(text)
     with pytest.warns(urdfkin.NotVerifiedWarning, match=f"not verified: Pinocchio {reason}"):
@@ -191,12 +178,8 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
     monkeypatch: pytest.MonkeyPatch, panda: Robot
 ) -> None:
     # An infinite disagreement with an infinite bound: of the two parts of a check, either may be such a one.
-    wrong = Comparison(1, np.inf, np.nan, (0, 0))
-    for results in (
-        [wrong],
-        [wrong, Comparison(1, 1.0, 0.5, (0, 0))],
-        [Comparison(1, 1.0, 0.5, (0, 0)), wrong],
-    ):
+    wrong, right = Comparison(1, np.inf, np.nan, (0, 0)), Comparison(1, 1.0, 0.5, (0, 0))
+    for results in ([wrong], [wrong, right], [right, wrong]):
         found = iter(results)
         monkeypatch.setattr(verifier, "compare", lambda *_, found=found: next(found))
         monkeypatch.setattr(verifier, "_MOST", 1)
@@ -204,25 +187,21 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
             panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
 
 
-INPUTS = {
-    "text": "abc",
-    "complex numbers": np.ones(8) * 1j,
-    "a ragged list": [[1.0], [1.0, 2.0]],
-    "none": None,
-    "dates": np.zeros(8, dtype="datetime64[s]"),
-    "strings of numbers": ["0"] * 8,
-}
+INPUTS: dict[str, Any] = {
+    "text": "abc", "complex numbers": np.ones(8) * 1j, "a ragged list": [[1.0], [1.0, 2.0]], "none": None,
+    "dates": np.zeros(8, dtype="datetime64[s]"), "strings of numbers": ["0"] * 8,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", INPUTS)
 def test_what_is_no_numbers_is_refused(panda: Robot, kind: str) -> None:
     value = INPUTS[kind]
     with pytest.raises(UrdfkinError, match=r"q must be real numbers|q needs 8 numbers|unknown pose 'abc'"):
-        panda.placement(value, "panda_hand")  # type: ignore[arg-type]
+        panda.placement(value, "panda_hand")
     with pytest.raises(UrdfkinError, match=r"v must be real numbers|v needs 8 numbers|unknown pose 'abc'"):
-        panda.velocity(np.zeros(8), value, "panda_hand")  # type: ignore[arg-type]
+        panda.velocity(np.zeros(8), value, "panda_hand")
     with pytest.raises(UrdfkinError, match=r"q must be real numbers|q must be finite|wrong length"):
-        panda.from_pinocchio(value)  # type: ignore[arg-type]
+        panda.from_pinocchio(value)
 
 
 def test_a_wrong_length_names_the_joints(panda: Robot) -> None:
@@ -254,9 +233,7 @@ def test_batches_that_do_not_fit_are_refused_with_their_shapes(panda: Robot) -> 
         panda.placement(np.zeros((2, 8)), "panda_hand", base=base)
 
 
-def test_a_frame_that_does_not_exist_offers_the_nearest_and_one_that_is_no_name_is_refused(
-    panda: Robot,
-) -> None:
+def test_a_frame_that_does_not_exist_offers_the_nearest_and_what_is_no_name_is_refused(panda: Robot) -> None:
     with pytest.raises(UnknownNameError, match="unknown frame 'hand'; did you mean panda_hand") as caught:
         panda.jacobian(panda.neutral(), "hand")
     assert caught.value.nearest[0] == "panda_hand"
@@ -314,18 +291,12 @@ def test_a_base_is_read_only_and_comes_back_from_a_pickle() -> None:
 
 
 def test_errors_come_back_from_a_pickle_as_they_were() -> None:
-    errors = []
-    for attempt in (
-        lambda: urdfkin.load("pnda"),
-        lambda: urdfkin.load("/nowhere/x.urdf"),
-        lambda: urdfkin.load("<robot/>"),
-        lambda: urdfkin.load("ur5").placement(np.zeros(5), "tool0"),
-    ):
+    ur5 = urdfkin.load("ur5")
+    attempts: Any = (urdfkin.load, "pnda"), (urdfkin.load, "/nowhere/x.urdf"), (urdfkin.load, "<robot/>")
+    for attempt, wrong in (*attempts, (ur5.placement, np.zeros(5))):
         with pytest.raises(urdfkin.UrdfkinError) as caught:
-            attempt()
-        errors.append(caught.value)
-    for error in errors:
-        copy = pickle.loads(pickle.dumps(error))
+            attempt(wrong)
+        error, copy = caught.value, pickle.loads(pickle.dumps(caught.value))
         assert type(copy) is type(error)
         assert str(copy) == str(error)
         assert copy.__dict__.keys() == error.__dict__.keys()

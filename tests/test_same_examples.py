@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -33,14 +34,8 @@ def draws(folder: Path, *imported: str) -> str:
         encoding="utf-8",
     )
     path = os.pathsep.join([str(folder), str(ROOT)])
-    return subprocess.run(
-        [sys.executable, str(script), *imported],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": path},
-        check=True,
-        capture_output=True,
-        text=True,
-    ).stdout
+    how: dict[str, Any] = {"cwd": ROOT, "env": {**os.environ, "PYTHONPATH": path}, "text": True}
+    return str(subprocess.check_output([sys.executable, str(script), *imported], **how))
 
 
 @pytest.mark.slow

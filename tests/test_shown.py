@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ import pytest
 
 import urdfkin
 from tests.attacks.hostile import NAMES, urdf
+from tests.markup import Page
 from urdfkin.dh.export import export
 from urdfkin.dh.units import units_of
 from urdfkin.errors.display import Table, TextDocument
@@ -37,15 +37,12 @@ def robot() -> Robot:
 def objects(robot: Robot) -> dict[str, Any]:
     rates = "neutral, panda_joint1=1, panda_joint2=0.5"
     return {
-        "robot": robot,
-        "table": robot.dh(),
-        "chain": robot.chain(),
+        "robot": robot, "table": robot.dh(), "chain": robot.chain(),
         "breakdown": robot.acceleration_breakdown("ready", rates, rates),
         "breakdown of a batch": robot.acceleration_breakdown(robot.sample(4), rates, rates),
-        "certificate": robot.certificate(),
-        "findings": urdfkin.load("planar_two_link").findings,
+        "certificate": robot.certificate(), "findings": urdfkin.load("planar_two_link").findings,
         "check": urdfkin.check('<robot name="r"><link name="base"/><link name="stray"/></robot>'),
-    }
+    }  # fmt: skip
 
 
 #: What must stand in each form of each object.
@@ -56,27 +53,21 @@ SAYS = {
     "breakdown": ("Acceleration by joint and kind", "panda_joint2", "centripetal", "coriolis", "sum"),
     "breakdown of a batch": ("sample", "... and 2 more samples"),
     "certificate": (
-        "panda: NOT verified by Pinocchio",
-        "jacobian",
-        "the check was turned off by verify=False",
-        "sha256",
+        "panda: NOT verified by Pinocchio", "jacobian", "the check was turned off by verify=False", "sha256",
     ),
     "findings": ("no findings",),
     "check": ("1 error", "URDF411", "stray", "the link has no parent"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", SAYS)
-def test_an_object_says_what_there_is_to_say_in_every_form(
-    name: str, form: str, objects: dict[str, Any]
-) -> None:
+def test_an_object_says_what_there_is_to_say_in_every_form(name: str, form: str, objects: Any) -> None:
     if (name, form) in {("certificate", "__str__"), ("table", "_repr_latex_")}:
         pytest.skip("a form of its own, tested elsewhere")
     text = getattr(objects[name], form)()
     plain = html.unescape(text).replace("\\", "").replace("&#8288;", "")
-    missing = [words for words in SAYS[name] if words not in plain]
-    assert missing == []
+    assert [words for words in SAYS[name] if words not in plain] == []
 
 
 @pytest.mark.parametrize("name", ["robot", "table", "chain", "breakdown"])
@@ -110,20 +101,6 @@ def test_a_report_writes_itself_as_the_command_line_does() -> None:
         assert "planar_two_link" in text
 
 
-class _Tags(HTMLParser):
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.seen: set[str] = set()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.open.append(tag)
-        self.seen.add(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-
 def sheets() -> Iterator[Callable[[str], TextDocument]]:
     yield lambda name: TextDocument(name, ())
     yield lambda name: TextDocument("t", (name, Table((name, "x"), [(name, 1.0)])))
@@ -133,10 +110,12 @@ def sheets() -> Iterator[Callable[[str], TextDocument]]:
 def test_a_name_from_a_strangers_file_is_text_in_every_form(name: str) -> None:
     for made in sheets():
         sheet, tame = made(name), made("tame")
-        tags = _Tags()
-        tags.feed(sheet.html())
-        assert tags.open == []
-        assert tags.seen <= {"div", "p", "b", "table", "thead", "tbody", "tr", "th", "td"}
+        tags = [tag for tag, _ in Page(sheet.html()).skeleton]
+        while tags:  # every element ends inside the one in which it begins
+            end = next(i for i, tag in enumerate(tags) if tag.startswith("/"))
+            assert tags[end] == f"/{tags[end - 1]}"
+            assert tags[end - 1] in {"div", "p", "b", "table", "thead", "tbody", "tr", "th", "td"}
+            del tags[end - 1 : end + 1]
         for form in ("text", "markdown", "latex"):
             written = getattr(sheet, form)()
             assert len(written.splitlines()) == len(getattr(tame, form)().splitlines()), "no line is added"
@@ -188,14 +167,11 @@ def test_a_frame_may_be_left_out_where_there_is_one_tip(robot: Robot) -> None:
     np.testing.assert_array_equal(arm.placement(q), arm.placement(q, tip))
     np.testing.assert_array_equal(arm.velocity(q, rates), arm.velocity(q, rates, tip))
     np.testing.assert_array_equal(arm.acceleration(q, rates, rates), arm.acceleration(q, rates, rates, tip))
-    np.testing.assert_array_equal(
-        arm.analytical_jacobian([0.5, 0.6], representation="quaternion").shape, (7, 2)
-    )
+    assert arm.analytical_jacobian([0.5, 0.6], representation="quaternion").shape == (7, 2)
     np.testing.assert_array_equal(arm.prepare().jacobian(np.array(q)), arm.jacobian(q, tip))
     two = urdfkin.load(urdfkin.load("a1").urdf, verify=False)
-    with pytest.raises(
-        urdfkin.InputError, match=r"several tips: found .*FL_foot.*; name one, such as robot.tip"
-    ):
+    words = "several tips: found .*FL_foot.*; name one, such as robot.tip"
+    with pytest.raises(urdfkin.InputError, match=words):
         two.jacobian("ready")
 
 
@@ -238,16 +214,10 @@ def printed(name: str) -> dict[str, str]:
     compared = urdfkin.same(robot, other)
     changed = urdfkin.diff(text, text.replace('xyz="0.3', 'xyz="0.4'))
     found: dict[str, Any] = {
-        "robot": robot,
-        "certificate": robot.certificate(),
-        "chain": robot.chain(),
-        "table": robot.dh(),
-        "breakdown": robot.acceleration_breakdown(q, q, q),
-        "enclosures": robot.enclose(q, q, q),
-        "same": compared,
-        "findings": robot.findings,
-        "report": urdfkin.validate([text], samples=0),
-    }
+        "robot": robot, "certificate": robot.certificate(), "chain": robot.chain(), "table": robot.dh(),
+        "breakdown": robot.acceleration_breakdown(q, q, q), "enclosures": robot.enclose(q, q, q),
+        "same": compared, "findings": robot.findings, "report": urdfkin.validate([text], samples=0),
+    }  # fmt: skip
     found |= {f"finding {k}": one for k, one in enumerate(robot.findings)}
     found |= {f"change {k}": one for k, one in enumerate(changed.changes)}
     found |= {f"effect {k}": one for k, one in enumerate(changed.effects)}

@@ -11,10 +11,15 @@ import pinocchio as pin
 import pytest
 
 import urdfkin
+from tests.cli.running import good
 from tests.cli.running import urdfkin as run
 from tests.pages import DOCS, blocks
+from tests.reading import present
+from tests.urdfs import joint, limit
+from tests.urdfs import robot as robot_text
 from urdfkin.cli import commands
 from urdfkin.cli.explain import anchor, answers
+from urdfkin.model.tree import FloatArray
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
@@ -25,40 +30,34 @@ POSE = np.radians([30.0, 90.0])  # Pinocchio's order: the shoulder first, as it 
 
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
-    assert OWN is not None
     file = tmp_path / "mine.urdf"
-    file.write_text(OWN[1], "utf-8")
+    file.write_text(present(OWN)[1], "utf-8")
     return file
 
 
-def pinocchios_jacobian(file: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    model = pin.buildModelFromUrdf(str(file))
-    tool = model.getFrameId("tool")
-    found: np.ndarray[tuple[int, ...], np.dtype[np.float64]] = pin.computeFrameJacobian(
-        model, model.createData(), POSE, tool, pin.LOCAL_WORLD_ALIGNED
-    )
-    return found
+def pinocchios_jacobian(file: Path, q: FloatArray) -> FloatArray:
+    model: Any = pin.buildModelFromUrdf(str(file))
+    frame = model.getFrameId("tool")
+    return np.array(pin.computeFrameJacobian(model, model.createData(), q, frame, pin.LOCAL_WORLD_ALIGNED))
 
 
 def test_the_readme_links_to_the_start_and_to_the_questions() -> None:
-    headings = [
-        anchor(line[3:]) for line in (DOCS / "index.md").read_text().splitlines() if line[:3] == "## "
-    ]
+    lines = (DOCS / "index.md").read_text().splitlines()
+    headings = [anchor(line[3:]) for line in lines if line[:3] == "## "]
     (start,) = re.findall(r"\(docs/index\.md#([\w-]+)\)", README)
     assert start in headings
     assert "(docs/questions.md)" in README
 
 
 def test_nothing_is_wrong_with_their_file(own: Path) -> None:
-    done = run("check", str(own))
-    assert done.code == 0, done.text
+    good("check", str(own))
 
 
 def test_the_start_pages_robot_has_pinocchios_jacobian(own: Path) -> None:
     robot = urdfkin.load(own)
     pose = {"elbow": np.pi / 2, "shoulder": np.radians(30)}
     J = robot.jacobian([pose[name] for name in robot.coordinate_names], "tool")
-    np.testing.assert_allclose(J, pinocchios_jacobian(own), atol=1e-15)
+    np.testing.assert_allclose(J, pinocchios_jacobian(own, POSE), atol=1e-15)
     assert robot.certificate().verified
 
 
@@ -98,9 +97,8 @@ def transcripts() -> list[tuple[list[str], list[str]]]:
 
 def masked(text: str) -> str:
     """A text without the disagreements, which differ between machines."""
-    return re.sub(
-        r"worst (error |disagreement )?\S+|\S+% of|Pinocchio \S+|\d\S* of the bound", "", text
-    ).strip()
+    varying = r"worst (error |disagreement )?\S+|\S+% of|Pinocchio \S+|\d\S* of the bound"
+    return re.sub(varying, "", text).strip()
 
 
 def test_the_smallest_example_runs_and_is_verified() -> None:
@@ -148,15 +146,11 @@ def test_each_transcript_is_the_real_output(tmp_path: Path, monkeypatch: pytest.
 
 
 #: Somebody's own: joints are not in alphabetical order, a wheel turns without end.
-MINE = (
-    '<robot name="mine"><link name="floor"/><link name="column"/><link name="upper"/><link name="tool"/>'
-    '<joint name="turntable" type="continuous"><parent link="floor"/><child link="column"/>'
-    '<axis xyz="0 0 1"/></joint>'
-    '<joint name="shoulder" type="revolute"><parent link="column"/><child link="upper"/>'
-    '<origin xyz="0 0 0.4"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="9" velocity="3"/></joint>'
-    '<joint name="elbow" type="revolute"><parent link="upper"/><child link="tool"/>'
-    '<origin xyz="0.3 0 0"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="9" velocity="3"/></joint>'
-    "</robot>"
+MINE = robot_text(
+    joint("turntable", "continuous", "floor", "column"),
+    joint("shoulder", "revolute", "column", "upper", 'xyz="0 0 0.4"', "0 1 0", limit(-2, 2)),
+    joint("elbow", "revolute", "upper", "tool", 'xyz="0.3 0 0"', "0 1 0", limit(-2, 2)),
+    name="mine",
 )
 POSE_BY_NAME = "turntable=90deg, shoulder=-30deg, elbow=45deg"
 
@@ -169,16 +163,12 @@ def mine(tmp_path: Path) -> Path:
 
 
 def test_minute_one_the_jacobian_at_a_pose_in_degrees_by_joint_names(mine: Path) -> None:
-    done = run("jacobian", str(mine), "--q", POSE_BY_NAME)
-    assert done.code == 0
+    done = good("jacobian", str(mine), "--q", POSE_BY_NAME)
     assert all(name in done.text for name in ("jacobian of tool", "turntable", "shoulder", "elbow"))
     assert "verified by Pinocchio" in done.text
     data = run("jacobian", str(mine), "--q", POSE_BY_NAME, "--format", "json").data
-    model = pin.buildModelFromUrdf(str(mine))
     q = np.array([np.cos(np.pi / 2), np.sin(np.pi / 2), np.radians(-30), np.radians(45)])
-    frame = model.getFrameId("tool")
-    J = pin.computeFrameJacobian(model, model.createData(), q, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-    np.testing.assert_allclose(data["result"][0], J, atol=1e-15)
+    np.testing.assert_allclose(data["result"][0], pinocchios_jacobian(mine, q), atol=1e-15)
 
 
 def test_minute_three_the_table_in_a_notebook(mine: Path) -> None:
@@ -187,29 +177,22 @@ def test_minute_three_the_table_in_a_notebook(mine: Path) -> None:
     cell = table._repr_html_()
     assert "standard Denavit-Hartenberg parameters" in cell
     assert all("<td" in cell and joint in cell for joint in ("turntable", "shoulder", "elbow"))
-    np.testing.assert_allclose(
-        table.placement(POSE_BY_NAME), robot.placement(POSE_BY_NAME, "tool"), atol=1e-15
-    )
+    T = robot.placement(POSE_BY_NAME, "tool")
+    np.testing.assert_allclose(table.placement(POSE_BY_NAME), T, atol=1e-15)
 
 
 def test_minute_five_why_pinocchios_numbers_differ(mine: Path) -> None:
     robot = urdfkin.load(mine)
     q = pin.neutral(pin.buildModelFromUrdf(str(mine)))
-    with pytest.raises(
-        urdfkin.InputError, match=r"Pinocchio's q has that length: robot.from_pinocchio\(q\)"
-    ) as why:
+    words = r"Pinocchio's q has that length: robot.from_pinocchio\(q\)"
+    with pytest.raises(urdfkin.InputError, match=words) as why:
         robot.jacobian(q)
     assert "turntable, shoulder, elbow" in str(why.value)
     np.testing.assert_array_equal(robot.from_pinocchio(q), robot.neutral())
-    page = (Path(__file__).parents[1] / "docs" / "conventions-used.md").read_text(encoding="utf-8")
-    for answer in (
-        "LOCAL_WORLD_ALIGNED",
-        "classical one",
-        "[linear; angular]",
-        "from_pinocchio",
-        "not the order of the file",
-    ):
+    page = (DOCS / "conventions-used.md").read_text(encoding="utf-8")
+    for answer in ("LOCAL_WORLD_ALIGNED", "classical one", "[linear; angular]", "from_pinocchio"):
         assert answer in page
+    assert "not the order of the file" in page
 
 
 # -- docs/tour.md runs, prints what it says, and has its pictures --------------------------------------------

@@ -6,6 +6,7 @@ import sys
 import sysconfig
 import venv
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,11 +16,10 @@ ROOT = Path(__file__).parent.parent
 def run(*command: str | Path, cwd: Path) -> str:
     """What a command prints; it sees neither the checkout nor the tests' paths."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    done = subprocess.run(
-        list(map(str, command)), cwd=cwd, env=environment, capture_output=True, text=True, check=False
-    )
+    how: dict[str, Any] = {"cwd": cwd, "env": environment, "capture_output": True, "text": True}
+    done = subprocess.run([*map(str, command)], check=False, **how)
     assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    return str(done.stdout)
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +40,8 @@ def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.long
 def test_the_wheel_is_what_is_imported(elsewhere: Path) -> None:
-    printed = run(
-        elsewhere / "env/bin/python", "-c", "import urdfkin; print(urdfkin.__file__)", cwd=elsewhere
-    )
+    code = "import urdfkin; print(urdfkin.__file__)"
+    printed = run(elsewhere / "env/bin/python", "-c", code, cwd=elsewhere)
     assert Path(printed.strip()).is_relative_to(elsewhere / "env")
 
 

@@ -73,9 +73,7 @@ def merged(tree: KinematicTree) -> KinematicTree:
 
 def flipped(tree: KinematicTree) -> KinematicTree:
     """Every other axis turned round, so that the coordinate counts the other way."""
-    return with_axes_reversed(
-        tree, {joint.name for i, joint in enumerate(tree.joints) if joint.kind.has_axis and i % 2}
-    )
+    return with_axes_reversed(tree, {joint.name for joint in tree.joints[1::2] if joint.kind.has_axis})
 
 
 def with_axes_reversed(tree: KinematicTree, turned: Collection[str]) -> KinematicTree:
@@ -83,15 +81,12 @@ def with_axes_reversed(tree: KinematicTree, turned: Collection[str]) -> Kinemati
 
     def one(joint: Joint) -> Joint:
         if joint.mimic is not None:
-            signs = (-1.0 if name in turned else 1.0 for name in (joint.name, joint.mimic.leader))
-            own, leader = signs
+            own, leader = (-1.0 if name in turned else 1.0 for name in (joint.name, joint.mimic.leader))
             rule = Mimic(joint.mimic.leader, own * leader * joint.mimic.multiplier, own * joint.mimic.offset)
             joint = replace(joint, mimic=rule)
         if joint.name not in turned:
             return joint
-        limit = joint.limit
-        if limit is not None:
-            limit = replace(limit, lower=-limit.upper, upper=-limit.lower)
+        limit = joint.limit and replace(joint.limit, lower=-joint.limit.upper, upper=-joint.limit.lower)
         return replace(joint, axis=-joint.axis, limit=limit)
 
     return build_tree(tree.name, tree.links[0], [(one(j), p, c) for j, p, c in branches(tree)])
@@ -99,14 +94,8 @@ def with_axes_reversed(tree: KinematicTree, turned: Collection[str]) -> Kinemati
 
 def shifted(tree: KinematicTree) -> KinematicTree:
     """Every other joint's zero elsewhere: its coordinate reads more by 0.7 rad, or 0.07 m, at one place."""
-    return with_zeros_moved(
-        tree,
-        {
-            joint.name: 0.7 if joint.kind.turns else 0.07
-            for i, joint in enumerate(tree.joints)
-            if joint.kind.has_axis and not i % 2
-        },
-    )
+    some = [joint for joint in tree.joints[::2] if joint.kind.has_axis]
+    return with_zeros_moved(tree, {joint.name: 0.7 if joint.kind.turns else 0.07 for joint in some})
 
 
 def with_zeros_moved(tree: KinematicTree, off: Mapping[str, float]) -> KinematicTree:
@@ -121,8 +110,7 @@ def with_zeros_moved(tree: KinematicTree, off: Mapping[str, float]) -> Kinematic
             return joint
         o, limit = off[joint.name], joint.limit
         back = pose(-o * joint.axis) if joint.kind.turns else pose([0.0] * 3, -o * joint.axis)
-        if limit is not None:
-            limit = replace(limit, lower=limit.lower + o, upper=limit.upper + o)
+        limit = limit and replace(limit, lower=limit.lower + o, upper=limit.upper + o)
         return replace(joint, T_parent_joint=joint.T_parent_joint @ back, limit=limit)
 
     return build_tree(tree.name, tree.links[0], [(one(j), p, c) for j, p, c in branches(tree)])
@@ -148,17 +136,14 @@ def rerooted(tree: KinematicTree) -> KinematicTree:
     leaf = max(tree.leaves(), key=lambda link: len(tree.path(link)))
     path = tree.path(leaf)
     rows: list[Branch] = []
-    on_path = set(path)
     # What stands on a link of the path is seen from the frame of the joint that now carries it.
-    seen: dict[int, FloatArray] = {}
-    for i in path:
-        seen[tree.joints[i].parent] = inverse(tree.joints[i].T_parent_joint)
+    seen = {tree.joints[i].parent: inverse(tree.joints[i].T_parent_joint) for i in path}
     names = {link: f"{tree.links[link]}_body" for link in seen}
     names[leaf] = tree.links[leaf]
     for i, joint in enumerate(tree.joints):
         parent, child = joint.parent, i + 1
         T = seen.get(parent, np.eye(4)) @ joint.T_parent_joint
-        if i in on_path:  # its frame is the child's; run back, it counts about its axis turned round
+        if i in path:  # its frame is the child's; run back, it counts about its axis turned round
             back = replace(joint, axis=-joint.axis, T_parent_joint=seen.get(child, np.eye(4)))
             rows.append((back, names[child], names[parent]))
         else:
@@ -213,6 +198,13 @@ def moving(tree: KinematicTree) -> list[int]:
     return [i for i in tree.path(deepest) if tree.joints[i].kind.has_axis and tree.joints[i].nv]
 
 
+def middle(tree: KinematicTree) -> tuple[int, Joint]:
+    """The joint in the middle of the longest chain."""
+    chain = moving(tree)
+    at = chain[len(chain) // 2]
+    return at, tree.joints[at]
+
+
 def with_joint(tree: KinematicTree, at: int, joint: Joint) -> KinematicTree:
     """The tree with one joint exchanged."""
     joints = (*tree.joints[:at], joint, *tree.joints[at + 1 :])
@@ -227,27 +219,21 @@ def across(axis: FloatArray) -> FloatArray:
 
 def tilted(tree: KinematicTree, angle: float) -> KinematicTree:
     """One joint in the middle of the longest chain tilted, with all that hangs on it."""
-    chain = moving(tree)
-    at = chain[len(chain) // 2]
-    joint = tree.joints[at]
+    at, joint = middle(tree)
     T = joint.T_parent_joint @ pose(angle * across(joint.axis))
     return with_joint(tree, at, replace(joint, T_parent_joint=T))
 
 
 def lengthened(tree: KinematicTree, metres: float) -> KinematicTree:
     """One joint in the middle of the longest chain moved across its axis, with all that hangs on it."""
-    chain = moving(tree)
-    at = chain[len(chain) // 2]
-    joint = tree.joints[at]
+    at, joint = middle(tree)
     T = joint.T_parent_joint @ pose([0.0] * 3, metres * across(joint.axis))
     return with_joint(tree, at, replace(joint, T_parent_joint=T))
 
 
 def bent_axis(tree: KinematicTree, angle: float) -> KinematicTree:
     """One joint's axis alone tilted: at home everything stands where it stood."""
-    chain = moving(tree)
-    at = chain[len(chain) // 2]
-    joint = tree.joints[at]
+    at, joint = middle(tree)
     return with_joint(tree, at, replace(joint, axis=exp_rotation(angle * across(joint.axis)) @ joint.axis))
 
 
@@ -275,16 +261,13 @@ def bounded(tree: KinematicTree) -> KinematicTree:
     """With limits that a URDF can hold."""
     rows = []
     for joint, parent, child in branches(tree):
-        if joint.kind in (JointKind.REVOLUTE, JointKind.PRISMATIC):
-            limit = joint.limit or Limit(-1.0, 1.0, 1.0, 1.0)
-            ends = (
-                (limit.lower, limit.upper) if np.isfinite([limit.lower, limit.upper]).all() else (-1.0, 1.0)
-            )
-            finite = [x if np.isfinite(x) else 1.0 for x in (limit.velocity, limit.effort)]
-            limited = replace(joint, limit=Limit(*ends, *finite))
-            rows.append((limited, parent, child))
-        else:
-            rows.append((joint, parent, child))
+        limit = joint.limit or Limit(-1.0, 1.0, 1.0, 1.0)
+        ends = limit.lower, limit.upper
+        ends = ends if np.isfinite(ends).all() else (-1.0, 1.0)
+        finite = [x if np.isfinite(x) else 1.0 for x in (limit.velocity, limit.effort)]
+        limited = replace(joint, limit=Limit(*ends, *finite))
+        held = joint.kind in (JointKind.REVOLUTE, JointKind.PRISMATIC)
+        rows.append((limited if held else joint, parent, child))
     return build_tree(tree.name, tree.links[0], rows)
 
 
@@ -313,18 +296,11 @@ def disguised(tree: KinematicTree, seed: int = 0) -> KinematicTree:
 
 #: Changes that leave a robot the same.
 ALIKE: dict[str, Change] = {
-    "base moved": on_a_stand,
-    "links split": split,
-    "links merged": merged,
-    "axes flipped": flipped,
-    "zeros shifted": shifted,
-    "all renamed": renamed,
-    "other way up": rerooted,
-    "counted elsewhere": counted_elsewhere,
-    "slides exchanged": exchanged,
-    "all of it": everything,
+    "base moved": on_a_stand, "links split": split, "links merged": merged, "axes flipped": flipped,
+    "zeros shifted": shifted, "all renamed": renamed, "other way up": rerooted,
+    "counted elsewhere": counted_elsewhere, "slides exchanged": exchanged, "all of it": everything,
     "all of it, no name left": disguised,
-}
+}  # fmt: skip
 #: Changes that do not; a file rounded to four digits may be what it was.
 UNLIKE: dict[str, Change] = {
     **{f"tilted by {a:g}": partial(tilted, angle=a) for a in (1e-9, 1e-7, 1e-5, 1e-3, 1e-2)},

@@ -49,11 +49,8 @@ def within(robot: Robot, q: FloatArray) -> NDArray[np.bool_]:
 def searched(a: Robot, b: Robot, at_b: Callable[[FloatArray], FloatArray], interval: Interval) -> float:
     """The largest distance that a global search finds, computed at fifty digits."""
     path = a.tree.path(a.tree.link_index(interval.frame))
-    leaders = {
-        (a.tree.joints[i].mimic.leader if a.tree.joints[i].mimic else a.tree.joints[i].name)  # type: ignore[union-attr]
-        for i in path
-        if a.tree.joints[i].kind.nv
-    }
+    along = (a.tree.joints[i] for i in path)
+    leaders = {joint.mimic.leader if joint.mimic else joint.name for joint in along if joint.kind.nv}
     joints = [joint for joint in a.tree.joints if joint.name in leaders]
     places = [a.tree.q_index[a.tree.joint_index(joint.name)] for joint in joints]
     ends = [

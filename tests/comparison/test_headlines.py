@@ -101,7 +101,6 @@ def test_a_joint_of_another_kind_is_searched() -> None:
     a, b = arm(), arm(second="prismatic")
     found = urdfkin.same(a, b)
     worst = present(found.worst)
-
     far = math.hypot(1.0, 0.1 * math.sin(1.0), 0.1 * (1.0 - math.cos(1.0)))  # a bend of 1 rad, a slide of 1 m
     assert worst.lower == pytest.approx(far, rel=1e-3)
     assert math.isinf(worst.upper)
@@ -115,8 +114,7 @@ def test_a_joint_of_another_kind_is_searched() -> None:
 def test_a_robot_that_is_mounted_elsewhere_is_equivalent_up_to_the_base(below: str) -> None:
     a, b = arm(), arm(mount='<origin xyz="1 0 0.5"/>')
     if below:
-        joint = '<joint name="under" type="fixed"><parent link="{}"/><child link="{}"/></joint>'
-        more = below + joint.format("table", "world") + "</robot>"
+        more = f"{below}{joint('under', 'fixed', 'table', 'world')}</robot>"
         a, b = (text.replace("</robot>", more) for text in (a, b))
     found = urdfkin.same(a, b)
     assert (found.verdict, found.up_to) == (Verdict.SAME_AFTER, ("base",))
@@ -130,10 +128,7 @@ def test_a_robot_that_is_mounted_elsewhere_is_equivalent_up_to_the_base(below: s
 
 
 def test_a_frame_between_two_joints_of_the_base_is_no_mount() -> None:
-    more = (
-        '<link name="arm2"/><joint name="other" type="revolute"><parent link="world"/><child link="arm2"/>'
-        f"{limit()}</joint></robot>"
-    )
+    more = f'<link name="arm2"/>{joint("other", "revolute", "world", "arm2", more=limit())}</robot>'
     a, b = (arm(mount=f'<origin xyz="{x} 0 0"/>').replace("</robot>", more) for x in (0.0, 1.0))
     assert urdfkin.same(a, b, bounds=False).verdict is Verdict.DIFFERS
 
@@ -149,14 +144,11 @@ def test_intervals_cover_the_files_limits_where_mimic_joints_leave_theirs() -> N
     found = urdfkin.same(a, b)
     assert present(found.worst).lower == pytest.approx(550e-6, rel=1e-3)
     assert [found.exit_code(within=most) for most in (1e-4, 5.49e-4, 5.6e-4)] == [1, 1, 0]
-    assert headline(a, b, within=1e-4).startswith(
-        "NOT WITHIN 0.0001 m and rad without changes of B: b is 0.55 mm"
-    )
+    said = "NOT WITHIN 0.0001 m and rad without changes of B: b is 0.55 mm"
+    assert headline(a, b, within=1e-4).startswith(said)
     own = "joint ja ranges over -0.005 to 0.055 m; its mimic joints keep their limits from"
-    assert found.narrowed == (
-        f"A: {own} -0.005 to 0.005 only (jb)",
-        f"B: {own} -0.005 to 0.0049505 only (jb)",
-    )
+    ends = ("A", "0.005"), ("B", "0.0049505")
+    assert found.narrowed == tuple(f"{model}: {own} -0.005 to {end} only (jb)" for model, end in ends)
 
 
 def test_nothing_is_within_anything_where_no_bound_was_asked_for() -> None:
@@ -165,10 +157,10 @@ def test_nothing_is_within_anything_where_no_bound_was_asked_for() -> None:
 
 
 def test_the_command_answers_what_was_asked(tmp_path: Path) -> None:
-    for name, text in (("a", arm()), ("b", arm(tool='<origin xyz="0 0 0.15"/>')), ("f", finger(-1.0))):
-        (tmp_path / f"{name}.urdf").write_text(text)
-    (tmp_path / "g.urdf").write_text(finger(-1.01))
-    a, b, f, g = (str(tmp_path / f"{name}.urdf") for name in "abfg")
+    texts = arm(), arm(tool='<origin xyz="0 0 0.15"/>'), finger(-1.0), finger(-1.01)
+    a, b, f, g = files = [str(tmp_path / f"{name}.urdf") for name in "abfg"]
+    for file, text in zip(files, texts, strict=True):
+        Path(file).write_text(text)
     assert run("same", a, b).code == 0
     refused = run("same", a, b, "--within", "1e-6")
     assert refused.code == 1
@@ -196,10 +188,9 @@ def test_the_page_follows_the_question_and_says_where_it_comes_from(tmp_path: Pa
     assert run("same", a, b, "--within", "1e-4", "--html", page).code == 1
     assert 'class="verdict bad"' in Path(page).read_text()
     assert run("same", a, a, "--strict", "--html", page).code == 0
-    other = tmp_path / "c.urdf"
-    other.write_text(arm(tool='<origin xyz="0 0 0.15"/>'))
-    (tmp_path / "d.urdf").write_text(arm())
-    both = str(other), str(tmp_path / "d.urdf")
+    both = str(tmp_path / "c.urdf"), str(tmp_path / "d.urdf")
+    Path(both[0]).write_text(arm(tool='<origin xyz="0 0 0.15"/>'))
+    Path(both[1]).write_text(arm())
     assert run("same", *both, "--strict", "--html", page).code == 1
     assert 'class="verdict bad"' in Path(page).read_text()
     assert run("same", *both, "--within", "0.01", "--html", page).code == 1
@@ -209,12 +200,11 @@ def test_the_page_follows_the_question_and_says_where_it_comes_from(tmp_path: Pa
 
 
 def test_a_table_is_held_to_the_frames_that_both_name() -> None:
-    found = urdfkin.same("ur5", urdfkin.load("ur5").dh("tool0", "base"), within=1e-9)
-    assert found.within(1e-9)
-    moved = urdfkin.load("ur5").dh("tool0", "base")
-    tool = moved.tool.copy()
+    table = urdfkin.load("ur5").dh("tool0", "base")
+    assert urdfkin.same("ur5", table, within=1e-9).within(1e-9)
+    tool = table.tool.copy()
     tool[2, 3] += 0.05
-    found = urdfkin.same("ur5", replace(moved, tool=tool))
+    found = urdfkin.same("ur5", replace(table, tool=tool))
     assert found
     assert not found.within(1e-3)
 

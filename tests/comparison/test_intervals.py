@@ -82,12 +82,11 @@ def test_a_support_function_is_a_bound_and_a_close_one(seed: int) -> None:
 
 
 def test_a_frame_that_slides_without_end_has_no_bound() -> None:
-    text = (
-        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
-        '<joint name="turn" type="continuous"><parent link="a"/><child link="b"/><origin rpy="{} 0 0"/>'
-        '<axis xyz="0 0 1"/></joint>'
-        '<joint name="fly" type="floating"><parent link="b"/><child link="c"/></joint></robot>'
+    turn, fly = (
+        joint("turn", "continuous", "a", "b", 'rpy="{} 0 0"'),
+        joint("fly", "floating", "b", "c", axis=""),
     )
+    text = urdf(turn, fly)
     found = urdfkin.same(text.format("0"), text.format("0.1"))
     assert found.differences[0].place == "joint turn"
     worst = present(found.worst)
@@ -100,27 +99,27 @@ def test_a_frame_that_slides_without_end_has_no_bound() -> None:
 
 #: Robots, changes, frames: turns alone, a slide, followers, an axis that alone is bent.
 BOXES = [
-    ("panda", "rounded", "panda_hand_tcp"),
-    ("panda", "rounded", "panda_leftfinger"),
-    ("ur3_gripper", "tilted by 0.01", "wrist_3_link"),
-    ("elbow", "axis bent", "tool"),
-    ("panda", "other rule", "panda_rightfinger"),
-    ("so100", "rounded", "jaw"),
-]
+    ("panda", "rounded", "panda_hand_tcp"), ("panda", "rounded", "panda_leftfinger"),
+    ("ur3_gripper", "tilted by 0.01", "wrist_3_link"), ("elbow", "axis bent", "tool"),
+    ("panda", "other rule", "panda_rightfinger"), ("so100", "rounded", "jaw"),
+]  # fmt: skip
 
 
 def searched_boxes(name: str, what: str, link: str) -> tuple[Search, FramePair]:
-    b = present(changed(name, what))
-    return laid(robot(name), b, link)
+    return laid(robot(name), present(changed(name, what)), link)
 
 
-def laid(
-    a: urdfkin.Robot, b: urdfkin.Robot, link: str, gauge: Gauge | None = None
-) -> tuple[Search, FramePair]:
+def laid(a: Robot, b: Robot, link: str, gauge: Gauge | None = None) -> tuple[Search, FramePair]:
     judge = Comparator((a, b), {}, bounds=True)
     found = align(*judge.mechanisms, {}, gauge)
     frame = next(one for one in found.frames if a.tree.links[one.a] == link)
     return judge.search(found, variables_of(found, judge.tolerance)), frame
+
+
+def bounds_of(search: Search, frame: FramePair) -> tuple[Sequence[str], FloatArray]:
+    """Variables, and bounds on second derivatives by them."""
+    steps, some = moved_together(search.found, search.variables, frame)
+    return curvature(steps, [one for one in some if one is not None], search.variables, frame)
 
 
 def hold_against_differences(search: Search, frame: FramePair, names: Sequence[str], M: FloatArray) -> None:
@@ -142,18 +141,11 @@ def hold_against_differences(search: Search, frame: FramePair, names: Sequence[s
 
 def two_joints(elbow: str, multiplier: float | None) -> urdfkin.Robot:
     """An arm whose second joint stands at an origin, and follows the first one if there is a multiplier."""
-    follows = "" if multiplier is None else f'<mimic joint="j1" multiplier="{multiplier}"/>'
     reach = 3.0 * max(1.0, abs(multiplier or 0.0))
-    limit = f'<limit lower="{-reach}" upper="{reach}" effort="1" velocity="1"/>'
-    return urdfkin.load(
-        f"""<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
-        <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
-        <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
-        <joint name="j2" type="revolute"><parent link="upper"/><child link="fore"/><origin {elbow}/>
-        <axis xyz="0 1 0"/>{limit}{follows}</joint>
-        <joint name="mount" type="fixed"><parent link="fore"/><child link="tool"/><origin xyz="1 0 0"/>
-        </joint></robot>"""
-    )
+    more = limit(-reach, reach) + ("" if multiplier is None else mimic("j1", multiplier))
+    first = joint("j1", "revolute", "base", "upper", more=limit(-3, 3))
+    second = joint("j2", "revolute", "upper", "fore", elbow, "0 1 0", more)
+    return urdfkin.load(urdf(first, second, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis="")))
 
 
 @pytest.mark.parametrize("multiplier", [None, 5.0, -0.25])
@@ -166,8 +158,7 @@ def test_second_derivatives_are_bounded_for_tilted_and_for_parallel_axes_and_fol
 ) -> None:
     a, b = two_joints('xyz="1 0 0"', multiplier), two_joints(elbow, multiplier)
     search, frame = laid(a, b, "tool")
-    steps, some = moved_together(search.found, search.variables, frame)
-    names, M = curvature(steps, [one for one in some if one is not None], search.variables, frame)
+    names, M = bounds_of(search, frame)
     assert np.isfinite(M).all()
     hold_against_differences(search, frame, names, M)
 
@@ -176,15 +167,10 @@ def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() 
     s = 0.01
 
     def arm(slide: str) -> urdfkin.Robot:
-        limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+        first = joint("j1", "revolute", "base", "upper", more=limit())
+        second = joint("j2", "prismatic", "upper", "fore", slide, "1 0 0", limit() + mimic("j1"))
         return urdfkin.load(
-            f"""<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
-            <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
-            {limit}</joint>
-            <joint name="j2" type="prismatic"><parent link="upper"/><child link="fore"/><origin {slide}/>
-            <axis xyz="1 0 0"/>{limit}<mimic joint="j1"/></joint>
-            <joint name="j3" type="revolute"><parent link="fore"/><child link="tool"/><axis xyz="0 1 0"/>
-            {limit}</joint></robot>"""
+            urdf(first, second, joint("j3", "revolute", "fore", "tool", "", "0 1 0", limit()))
         )
 
     search, frame = laid(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
@@ -196,9 +182,7 @@ def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() 
 
 
 def test_joints_that_follow_by_other_multipliers_have_no_bound_on_second_derivatives() -> None:
-    search, frame = laid(two_joints('xyz="1 0 0"', 0.5), two_joints('xyz="1 0 0"', 0.6), "tool")
-    steps, some = moved_together(search.found, search.variables, frame)
-    _, M = curvature(steps, [one for one in some if one is not None], search.variables, frame)
+    _, M = bounds_of(*laid(two_joints('xyz="1 0 0"', 0.5), two_joints('xyz="1 0 0"', 0.6), "tool"))
     assert np.isinf(M).all()
 
 
@@ -213,12 +197,10 @@ def test_the_first_derivatives_bound_of_a_box_is_no_less_than_its_corners(variab
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=variables)))
     corners = np.linalg.norm(D[:, np.newaxis] + np.einsum("nij,sj->nsi", G, signs * h), axis=-1).max(axis=1)
     assert (bound >= corners * (1.0 - 1e-12)).all()
-    along = (
-        np.abs((D[:, :, np.newaxis] * G).sum(axis=1)) / np.maximum(np.linalg.norm(D, axis=1), 1e-300)[:, None]
-    )
-    size = np.linalg.norm(D, axis=1) + along @ h
-    assert (bound <= np.linalg.norm(D, axis=1) + np.linalg.norm(G, axis=1) @ h + 1e-12).all()
-    assert (bound >= size).all()
+    lengths = np.linalg.norm(D, axis=1)
+    along = np.abs((D[:, :, np.newaxis] * G).sum(axis=1)) / np.maximum(lengths, 1e-300)[:, None]
+    assert (bound <= lengths + np.linalg.norm(G, axis=1) @ h + 1e-12).all()
+    assert (bound >= lengths + along @ h).all()
     if variables == 1:
         np.testing.assert_allclose(bound, corners, rtol=1e-12)
 
@@ -239,9 +221,7 @@ def test_a_tools_point_moves_as_its_jacobian_says(tool: tuple[float, float, floa
 @pytest.mark.parametrize(("name", "what", "link"), BOXES)
 def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, link: str) -> None:
     search, frame = searched_boxes(name, what, link)
-    steps, some = moved_together(search.found, search.variables, frame)
-    pairs = [pair for pair in some if pair is not None]
-    names, M = curvature(steps, pairs, search.variables, frame)
+    names, M = bounds_of(search, frame)
     if not np.isfinite(M).all():
         assert what == "other rule"
         return
@@ -278,37 +258,29 @@ def test_a_joint_that_mimics_in_one_model_only_is_not_bounded_as_if_one_variable
 
 def test_the_worst_configuration_names_a_joint_that_moves_on_its_own_in_b_only() -> None:
     a, b = two_turns("0", mimic("j1")), two_turns("0", "")
-    found = urdfkin.same(a, b)
-    assert found.worst is not None
-    q = {"j1": found.worst.q_a[0], "j2": found.worst.q_b[1]}
+    found, turned = urdfkin.same(a, b), urdfkin.same(b, a)
+    worst = present(found.worst)
+    q = {"j1": worst.q_a[0], "j2": worst.q_b[1]}
     apart = b.placement(q, "tool")[:3, 3] - a.placement({"j1": q["j1"]}, "tool")[:3, 3]
-    assert np.linalg.norm(apart) == pytest.approx(found.worst.lower)
-    assert where(found, found.worst) == f"j1 {q['j1']:.6g} rad, j2 of B {q['j2']:.6g} rad"
-    turned = urdfkin.same(b, a)
-    assert turned.worst is not None
-    assert "of B" not in where(turned, turned.worst)
+    assert np.linalg.norm(apart) == pytest.approx(worst.lower)
+    assert where(found, worst) == f"j1 {q['j1']:.6g} rad, j2 of B {q['j2']:.6g} rad"
+    assert "of B" not in where(turned, present(turned.worst))
 
 
 @pytest.mark.slow
 def test_what_boxes_prove_is_proven_again() -> None:
-    a, b = robot("so100"), changed("so100", "rounded")
-    assert b is not None
-    plain, found = urdfkin.same(a, b, boxes=0), urdfkin.same(a, b)
-    assert plain.worst is not None
-    assert found.worst is not None
-    assert found.worst.lower == plain.worst.lower
-    assert found.worst.upper <= plain.worst.upper
+    a, b = robot("so100"), present(changed("so100", "rounded"))
+    found = urdfkin.same(a, b)
+    plain, worst = present(urdfkin.same(a, b, boxes=0).worst), present(found.worst)
+    assert worst.lower == plain.lower
+    assert worst.upper <= plain.upper
     assert recheck(certificate(found), a, b) == []
 
 
 def test_of_robots_that_nothing_moves_the_distance_is_told_too() -> None:
-    text = (
-        '<robot name="r"><link name="base"/><link name="mount"/>'
-        '<joint name="j" type="fixed"><parent link="base"/><child link="mount"/>'
-        '<origin xyz="0.3 {} 0"/></joint></robot>'
-    )
+    text = urdf(joint("j", "fixed", "base", "mount", 'xyz="0.3 {} 0"', axis=""))
     found = urdfkin.same(text.format(0), text.format(0.004))
     assert found.verdict is Verdict.SAME_AFTER  # as a tool frame it may lie elsewhere; as written it does
-    assert found.worst_as_written is not None
-    assert found.worst_as_written.lower == pytest.approx(0.004, rel=1e-9)
-    assert 0.004 <= found.worst_as_written.upper <= 0.00402
+    worst = present(found.worst_as_written)
+    assert worst.lower == pytest.approx(0.004, rel=1e-9)
+    assert 0.004 <= worst.upper <= 0.00402

@@ -106,29 +106,25 @@ def test_what_has_to_be_done_makes_them_move_alike(name: str, what: str) -> None
 def test_two_models_differ_whichever_is_called_a() -> None:
     a, b = robot("elbow"), other("elbow", "tilted by 0.001")
     there, back = urdfkin.same(a, b).worst, urdfkin.same(b, a).worst
-    assert there is not None
-    assert back is not None
+    there, back = present(there), present(back)
     assert (there.lower, there.upper) == pytest.approx((back.lower, back.upper), rel=5e-3)
 
 
 def test_a_follower_that_was_dropped_is_found() -> None:
     a, b = robot("panda"), urdfkin.load(robot("panda").urdf, mimic=False, verify=False)
     found = urdfkin.same(a, b)
-    assert [one.words for one in found.differences] == [
-        "joint panda_finger_joint2 is a mimic joint in A and an independent joint in B: 1.0"
-        " panda_finger_joint1 +0"
-    ]
+    words = "joint panda_finger_joint2 is a mimic joint in A and an independent joint in B: 1.0"
+    assert [one.words for one in found.differences] == [f"{words} panda_finger_joint1 +0"]
     assert present(found.worst).lower == pytest.approx(0.04)  # one finger open, the other closed
 
 
 @pytest.mark.slow
 def test_a_joint_that_is_fixed_in_one_model_is_named_and_its_effect_bounded() -> None:
     found = urdfkin.same("icub", "icub_reduced")
-    assert {one.place for one in found.differences} == {
-        f"joint neck_{way}" for way in ("pitch", "roll", "yaw")
-    }
-    assert found.worst is not None
-    assert found.worst.lower <= found.worst.upper <= 1.05 * found.worst.lower
+    joints = {f"joint neck_{way}" for way in ("pitch", "roll", "yaw")}
+    assert {one.place for one in found.differences} == joints
+    worst = present(found.worst)
+    assert worst.lower <= worst.upper <= 1.05 * worst.lower
 
 
 def test_a_mimic_joint_with_multiplier_zero_and_a_fixed_joint_have_a_bounded_distance() -> None:
@@ -150,13 +146,11 @@ def test_another_tool_is_something_to_be_done_not_a_difference() -> None:
     b = urdfkin.load(to_urdf(pairs.with_joint(tree, at, replace(tree.joints[at], T_parent_joint=T))))
     found = urdfkin.same(robot("panda"), b)
     assert found.verdict is Verdict.SAME_AFTER
-    assert found.after == (
-        'frame panda_hand_tcp of B is frame panda_hand_tcp of A, moved by xyz="0.0 0.0 0.125"'
-        ' rpy="0.0 0.0 0.0"',
-    )
-    assert found.as_written is not None
-    assert found.as_written.frame == "panda_hand_tcp"
-    assert found.as_written.lower == pytest.approx(0.125)
+    moved = 'moved by xyz="0.0 0.0 0.125" rpy="0.0 0.0 0.0"'
+    assert found.after == (f"frame panda_hand_tcp of B is frame panda_hand_tcp of A, {moved}",)
+    written = present(found.as_written)
+    assert written.frame == "panda_hand_tcp"
+    assert written.lower == pytest.approx(0.125)
     assert (found.exit_code(), found.exit_code(strict=True)) == (0, 1)
 
 
@@ -189,46 +183,34 @@ def test_it_is_quick(name: str, seconds: float) -> None:
     assert time.process_time() - began <= seconds
 
 
-FINGERS = (
-    "<robot name='g'><link name='{0[0]}'/><link name='{0[1]}'/><link name='{0[2]}'/>"
-    "<joint name='{1[0]}' type='revolute'><parent link='{0[0]}'/><child link='{0[1]}'/>"
-    "<origin xyz='-0.03 0 0.05' rpy='0 {2} 0'/><axis xyz='0 -1 0'/>"
-    "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
-    "<joint name='{1[1]}' type='revolute'><parent link='{0[0]}'/><child link='{0[2]}'/>"
-    "<origin xyz='0.03 0 0.05'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' effort='1' velocity='1'/>"
-    "<mimic joint='{1[0]}' multiplier='{3}' offset='{4}'/></joint></robot>"
-)
+def fingers(names: str, tilt: float, multiplier: float, offset: float) -> Robot:
+    """A palm with two fingers, the second of which follows the first."""
+    palm, a, b, leader, follower = names.split()
+    rule = limit() + mimic(leader, multiplier, offset)
+    first = joint(leader, "revolute", palm, a, f'xyz="-0.03 0 0.05" rpy="0 {tilt} 0"', "0 -1 0", limit())
+    second = joint(follower, "revolute", palm, b, 'xyz="0.03 0 0.05"', "0 1 0", rule)
+    return urdfkin.load(urdfs.robot(first, second), verify=False)
 
 
 def test_a_mimic_rule_gives_the_zero_of_a_joint_on_whose_link_nothing_hangs() -> None:
-    a = urdfkin.load(FINGERS.format(("palm", "a", "b"), ("ja", "jb"), 0, 1, 0), verify=False)
-    shifted = FINGERS.format(("L0", "L1", "L2"), ("k1", "k2"), -0.5, 1, 0.5)
-    found = urdfkin.same(a, urdfkin.load(shifted, verify=False))
+    found = urdfkin.same(fingers("palm a b ja jb", 0, 1, 0), fingers("L0 L1 L2 k1 k2", -0.5, 1, 0.5))
     assert found.verdict is Verdict.SAME_AFTER, found.differences
     assert found.after == ("q[k1] = q[ja] - 0.5",)
 
 
 @pytest.mark.parametrize(("multiplier", "offset"), [(1.001, 0.0), (1, 0.001)])
-def test_links_of_one_name_fix_the_zero_that_a_mimic_rule_could_give(
-    multiplier: float, offset: float
-) -> None:
-    names = ("palm", "a", "b"), ("ja", "jb")
-    a, b = (
-        urdfkin.load(FINGERS.format(*names, 0, *rule), verify=False)
-        for rule in ((1, 0), (multiplier, offset))
-    )
+def test_links_of_one_name_fix_the_zero_that_a_mimic_rule_may_give(multiplier: float, offset: float) -> None:
+    a, b = (fingers("palm a b ja jb", 0, *rule) for rule in ((1, 0), (multiplier, offset)))
     found = urdfkin.same(a, b, bounds=False)
     assert [one.what for one in found.differences] == ["mimic rule"]
 
 
 def telescope(names: str, x: float) -> Robot:
     """Four slides along one axis; x: metres that the third one is off."""
-    joints = [
-        joint(
-            name, "prismatic", f"l{i}", f"l{i + 1}", f'xyz="{x if i == 2 else 0} 0 0.2"', more=limit(0, 0.3)
-        )
-        for i, name in enumerate(names)
-    ]
+    joints = []
+    for i, name in enumerate(names):
+        origin = f'xyz="{x if i == 2 else 0} 0 0.2"'
+        joints.append(joint(name, "prismatic", f"l{i}", f"l{i + 1}", origin, more=limit(0, 0.3)))
     return urdfkin.load(urdfs.robot(*joints), verify=False)
 
 
@@ -251,12 +233,8 @@ def test_slides_whose_names_agree_are_tried_in_no_other_order(monkeypatch: pytes
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("compared", [urdfkin.same, urdfkin.diff])
 def test_a_robot_longer_than_a_double_can_square_is_refused(compared: Any) -> None:
-    near, far = (
-        f"<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='fixed'><parent link='a'/>"
-        f"<child link='b'/><origin xyz='0 0 {z}'/></joint></robot>"
-        for z in ("1", "1e308")
-    )
-    robots = [urdfkin.load(text, verify=False) for text in (near, far)]
+    joints = (joint("j", "fixed", "a", "b", f'xyz="0 0 {z}"', axis="") for z in ("1", "1e308"))
+    robots = [urdfkin.load(urdfs.robot(one), verify=False) for one in joints]
     with pytest.raises(urdfkin.InputError, match=r"model B, r: .*found 1e\+308 m"):
         compared(*robots)
 
@@ -293,6 +271,7 @@ def confirmed(**changed: Any) -> dict[str, Any]:
     return done | changed
 
 
+COMPUTED = "differs from the one computed from the models"
 FORGED: dict[str, Any] = {
     "its upper bound is wrong": lambda d: d["frames"][-1].update(upper=0.99 * d["frames"][-1]["lower"]),
     "finds": lambda d: d["frames"][-1].update(lower=1.01 * d["frames"][-1]["lower"]),
@@ -301,26 +280,18 @@ FORGED: dict[str, Any] = {
     "`verdict`: the models give differs": lambda d: d.update(verdict="same"),
     "`differences`: this difference is missing": lambda d: d.update(differences=[]),
     "`differences`: this is not a difference": lambda d: d["differences"].append(
-        {**d["differences"][0], "place": "joint x"}
-    ),
+        {**d["differences"][0], "place": "joint x"}),
     "has no interval": lambda d: d["frames"].pop(),
     "a frame has two intervals": lambda d: d["frames"].append(d["frames"][-1]),
     "rad there, not": lambda d: d["frames"][-1].update(radians_seen=0.1),
-    "`remarks`: the entry differs from the one computed from the models": lambda d: d["remarks"].append(
-        d["differences"][0]
-    ),
-    "`up_to`: the entry differs from the one computed from the models": lambda d: d["up_to"].append("senses"),
+    f"`remarks`: the entry {COMPUTED}": lambda d: d["remarks"].append(d["differences"][0]),
+    f"`up_to`: the entry {COMPUTED}": lambda d: d["up_to"].append("senses"),
     "`tools`: the entries differ from those computed from the models": lambda d: d["tools"].append(
-        {"a": "tool", "b": "tool", "pose": np.eye(4).tolist()}
-    ),
-    "`links`: the entry differs from the one computed from the models": lambda d: d["links"].pop(),
-    "`joints`: the entry differs from the one computed from the models": lambda d: d["joints"].pop(),
-    "`rounding`: the entry differs from the one computed from the models": lambda d: d["rounding"].update(
-        metres=1.0
-    ),
-    "`base_links`: the entry differs from the one computed from the models": lambda d: d.update(
-        base_links=["tool"] * 2
-    ),
+        {"a": "tool", "b": "tool", "pose": np.eye(4).tolist()}),
+    f"`links`: the entry {COMPUTED}": lambda d: d["links"].pop(),
+    f"`joints`: the entry {COMPUTED}": lambda d: d["joints"].pop(),
+    f"`rounding`: the entry {COMPUTED}": lambda d: d["rounding"].update(metres=1.0),
+    f"`base_links`: the entry {COMPUTED}": lambda d: d.update(base_links=["tool"] * 2),
     "`base`: the matrix is not a rigid motion": lambda d: d["base"][2].__setitem__(2, -1.0),
     "model A: its name is": lambda d: d["a"].update(name="another"),
     "`differences`: the size or a value is wrong": lambda d: d["differences"][0].update(radians=1e-6),
@@ -332,12 +303,11 @@ FORGED: dict[str, Any] = {
     "neither a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
     "nor a reason": lambda d: d.update(checked=confirmed(state="not asked", reason="I was lazy")),
     "nor a reason for": lambda d: d.update(
-        checked=confirmed(state="not verified", by="", configurations=0, metres=0.0)
-    ),
+        checked=confirmed(state="not verified", by="", configurations=0, metres=0.0)),
     "nor a reason for its absence": lambda d: d.update(checked=confirmed(by="")),
     "`checked`: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
     "`orders`: the axes do not allow": lambda d: d["orders"].append(["joint_2", "joint_1"]),
-}
+}  # fmt: skip
 
 
 @pytest.mark.slow
@@ -365,15 +335,12 @@ def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
     assert asked == []
 
 
-def test_a_certificate_that_names_what_is_not_there_is_refused(
-    compared: tuple[Robot, Robot, Any],
-) -> None:
+def test_a_certificate_that_names_what_is_not_there_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
     a, b, document = compared
     forged = copy.deepcopy(document)
     forged["joints"][0]["b"] = "elsewhere"
-    with pytest.raises(
-        urdfkin.InputError, match=r"names a joint or link that one of the models does not have: .*'elsewhere'"
-    ):
+    words = "names a joint or link that one of the models does not have: .*'elsewhere'"
+    with pytest.raises(urdfkin.InputError, match=words):
         recheck(forged, a, b)
 
 
@@ -399,9 +366,8 @@ def test_a_free_joint_goes_only_where_a_rigid_motion_takes_it(kind: str) -> None
 
 def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
     a, _, document = compared
-    with pytest.raises(
-        urdfkin.InputError, match=r"model B: the certificate belongs to another version of this robot"
-    ):
+    words = "model B: the certificate belongs to another version of this robot"
+    with pytest.raises(urdfkin.InputError, match=words):
         recheck(document, a, a)
 
 
@@ -417,9 +383,8 @@ def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
     base = tmp_path / "elbow.urdf"
     base.write_text(robot("elbow").urdf)
     flipped, tilted = map(str, files.values())
-    assert [
-        run("same", str(base), *words).code for words in ([str(base)], [flipped], [flipped, "--strict"])
-    ] == [0, 0, 1]
+    ways = [str(base)], [flipped], [flipped, "--strict"]
+    assert [run("same", str(base), *words).code for words in ways] == [0, 0, 1]
     assert run("same", str(base), tilted, "--within", "0.011").code == 0  # 6 mm and 10 mrad
     assert run("same", str(base), tilted, "--within", "0.009").code == 1
     forms = [f for name in ("certificate", "markdown", "html") for f in (f"--{name}", str(tmp_path / name))]
@@ -491,23 +456,15 @@ def _idle(kind: str, offset: float) -> urdfkin.Robot:
     return urdfkin.load(_IDLE.format(kind=kind, x=1, y=0, rest=rest))
 
 
-@pytest.mark.parametrize(
-    ("idle", "kind", "offset", "place", "words"),
-    [
-        ("revolute", "fixed", 0.0, {"x": 1, "y": 0}, "fixes it at 0 rad"),
-        ("revolute", "fixed", 0.25, {"x": 1, "y": 0.25}, "fixes it at 0.25 rad"),
-        ("continuous", "fixed", 3.0, {"x": 1, "y": 3.0}, "fixes it at 3 rad"),
-    ],
-)
-def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(
-    idle: str, kind: str, offset: float, place: dict[str, float], words: str
-) -> None:
+@pytest.mark.parametrize(("idle", "offset"), [("revolute", 0.0), ("revolute", 0.25), ("continuous", 3.0)])
+def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(idle: str, offset: float) -> None:
     """In either order, and the certificate states it and holds."""
-    models = [_idle(idle, offset), urdfkin.load(_IDLE.format(kind=kind, rest="", **place))]
+    models = [_idle(idle, offset), urdfkin.load(_IDLE.format(kind="fixed", rest="", x=1, y=offset))]
     for which, (a, b) in zip("AB", (models, models[::-1]), strict=True):
         found = urdfkin.same(a, b)
         assert found.verdict is Verdict.SAME, found
-        remark = f"joint k never moves in {which}: its mimic rule has the multiplier 0 and {words}"
+        words = f"its mimic rule has the multiplier 0 and fixes it at {offset:g} rad"
+        remark = f"joint k never moves in {which}: {words}"
         assert remark in [one.words for one in found.remarks]
         assert found.exit_code(strict=True) == 1
         document = certificate(found)

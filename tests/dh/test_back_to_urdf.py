@@ -33,9 +33,8 @@ def placements(text: str, names: tuple[str, ...], q: FloatArray, tip: str) -> Fl
         full = pin.neutral(model)
         for name, value in zip(names, one, strict=True):
             joint = model.joints[model.getJointId(name)]
-            full[joint.idx_q : joint.idx_q + joint.nq] = (
-                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
-            )
+            own = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+            full[joint.idx_q : joint.idx_q + joint.nq] = own
         pin.framesForwardKinematics(model, data, full)
         poses.append(data.oMf[model.getFrameId(tip, pin.FrameType.BODY)].homogeneous)
     return np.array(poses)
@@ -69,17 +68,11 @@ def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, co
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "base", "tip"),
-    [
-        ("ur5", "base", "tool0"),
-        ("panda", "panda_link0", "panda_hand"),
-        ("tiago", "base_link", "arm_tool_link"),
-        ("talos", "left_sole_link", "imu_link"),
-    ],
-)
+    [("ur5", "base", "tool0"), ("panda", "panda_link0", "panda_hand"),
+     ("tiago", "base_link", "arm_tool_link"), ("talos", "left_sole_link", "imu_link")],
+)  # fmt: skip
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_a_catalogue_robot_survives_the_way_to_a_table_and_back(
-    name: str, base: str, tip: str, convention: str
-) -> None:
+def test_a_robot_survives_a_way_to_a_table_and_back(name: str, base: str, tip: str, convention: str) -> None:
     robot = load(name)
     table = robot.dh(tip, base, convention)
     again = load(table)
@@ -120,8 +113,7 @@ def test_a_tables_file_is_a_source_like_any_other(tmp_path: Path, root_joint: st
     np.testing.assert_array_equal(robot.jacobian(q, "tool0"), same.jacobian(q, "tool0"))
     assert robot.certificate().verified
     assert (robot.source, same.source) == (str(tmp_path / "arm.toml"), "<table>")
-    line = f"urdfkin.load({str(tmp_path / 'arm.toml')!r}"
-    assert robot.origin.python.startswith(line)
+    assert robot.origin.python.startswith(f"urdfkin.load({str(tmp_path / 'arm.toml')!r}")
 
 
 def test_a_table_is_validated_as_it_is_and_as_a_file() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from scripts.check_forms import RUN, Job, Missing
+from tests.comparison.pairs import with_joint
 from tests.dh.arms import arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift
@@ -26,18 +28,7 @@ def coupled() -> KinematicTree:
     """Turning and sliding joints, a follower, a nearly parallel pair."""
     near = shift(0.3, 0.2, 0.0) @ rotation("x", 1e-4) @ rotation("y", 2e-4)
     tree = arm(LINK, near, LINK, LINK, kinds="RRPR", tip=LINK)
-    joints = list(tree.joints)
-    follower = joints[3]
-    joints[3] = type(follower)(
-        follower.name,
-        follower.kind,
-        follower.parent,
-        follower.T_parent_joint,
-        follower.axis,
-        None,
-        Mimic("j1", -0.5, 0.2),
-    )
-    return KinematicTree(tree.name, tree.links, tuple(joints))
+    return with_joint(tree, 3, replace(tree.joints[3], mimic=Mimic("j1", -0.5, 0.2)))
 
 
 def nearly_parallel() -> KinematicTree:
@@ -70,27 +61,21 @@ def check(
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("form", ["numpy", "c", "matlab", "sympy", "casadi"])
-def test_written_code_computes_what_pinocchio_computes(
-    form: str, name: str, convention: str, tmp_path: Path
-) -> None:
+def test_code_computes_what_pinocchio_computes(form: str, name: str, convention: str, tmp_path: Path) -> None:
     check(form, TREES[name](), convention, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("form", ["roboticstoolbox", "ets"])
-def test_code_for_roboticstoolbox_computes_what_pinocchio_computes(
-    form: str, convention: str, tmp_path: Path
-) -> None:
+def test_roboticstoolbox_code_agrees_with_pinocchio(form: str, convention: str, tmp_path: Path) -> None:
     check(form, TREES["plain"](), convention, tmp_path)
     check(form, nearly_parallel(), convention, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_a_rigid_body_tree_computes_what_pinocchio_computes_on_classes_that_stand_in(
-    convention: str, tmp_path: Path
-) -> None:
+def test_a_rigid_body_tree_of_stand_ins_computes_what_pinocchio_does(convention: str, tmp_path: Path) -> None:
     check("matlab-rst", TREES["plain"](), convention, tmp_path, flip=["j2", "j3"])
 
 
@@ -112,16 +97,12 @@ def test_a_form_without_followers_says_so(form: str) -> None:
 
 
 def test_the_fifth_parameter_is_a_transform_of_its_own_and_limits_go_along() -> None:
-    tree = nearly_parallel()
-    text = export(dh_table(tree, "tip"), "roboticstoolbox")
+    text = export(dh_table(nearly_parallel(), "tip"), "roboticstoolbox")
     assert "ET.Ry(" in text
     assert "DHRobot" not in text
-    robot = export(dh_table(TREES["plain"](), "tip"), "roboticstoolbox")
-    assert "rtb.DHRobot(" in robot
-    limited = table_from_rows(
-        [{"a": 1, "alpha": 0, "d": 0, "theta": 0, "limit": {"lower": -1.5, "upper": 2.5}}, [1, 0, 0, 0]],
-        "standard",
-    )
+    assert "rtb.DHRobot(" in export(dh_table(TREES["plain"](), "tip"), "roboticstoolbox")
+    row = {"a": 1, "alpha": 0, "d": 0, "theta": 0, "limit": {"lower": -1.5, "upper": 2.5}}
+    limited = table_from_rows([row, [1, 0, 0, 0]], "standard")
     for form in ("roboticstoolbox", "ets"):
         assert export(limited, form).count("qlim=[-1.5, 2.5]") == export(limited, form).count("qlim") == 1
 
@@ -166,9 +147,8 @@ def test_an_unknown_form_offers_the_nearest() -> None:
         export(dh_table(TREES["plain"](), "tip"), "markdwon")
 
 
-PLAIN = table_from_rows(
-    [[0, 90, 0.3, 0], [0.4, 0, 0, -90], [0, 180, 0.1, 0, "P"]], "standard", angles="degrees"
-)
+ROWS = [[0, 90, 0.3, 0], [0.4, 0, 0, -90], [0, 180, 0.1, 0, "P"]]
+PLAIN = table_from_rows(ROWS, "standard", angles="degrees")
 
 
 def test_the_terminal_table_reads_as_one_writes_it() -> None:

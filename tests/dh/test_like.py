@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.cli.running import good, refused
 from tests.cli.test_dh import run
 from tests.dh.arms import arm
 from tests.dh.test_compare import disguised, elbow
 from tests.random_chains import configurations, rotation, shift, trees
-from urdfkin.dh import Convention, DHTable, dh_table, export, read_table, table_from_rows, units_of
+from urdfkin.dh import Convention, dh_table, export, read_table, table_from_rows, units_of
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.parse_table import published, read_mapping, reference_path, references
 from urdfkin.errors import InputError
@@ -31,10 +32,9 @@ def test_the_cells_of_any_way_to_write_the_robot_come_back(seed: int, kinds: str
     reference = disguised(dh_table(tree, "tip"), seed)
     table = dh_table(tree, "tip", like=reference)
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
-        own = {"theta"} if row.kind.turns else {"d"}  # whose zeros are the URDF's
-        for name in (
-            {"a", "alpha", "d"} - own - ({"a", "alpha", "d"} if i == 5 else {"d"} if i == 0 else set())
-        ):
+        free = {"theta"} if row.kind.turns else {"d"}  # whose zeros are the URDF's
+        free |= {0: {"d"}, 5: {"a", "alpha", "d"}}.get(i, set())
+        for name in {"a", "alpha", "d"} - free:
             off = getattr(row, name) - getattr(other, name)
             off = math.remainder(off, 2 * math.pi) if name == "alpha" else off
             assert abs(off) < 1e-12, (i, name)
@@ -101,15 +101,11 @@ def test_another_robots_table_is_refused() -> None:
         dh_table(elbow(), "tip", like=replace(other, rows=other.rows[:3]))
 
 
-def table_with(**options: str) -> DHTable:
-    return dh_table(elbow(), "tip", **options)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_x_points_so_that_a_or_alpha_is_not_negative(convention: str) -> None:
     inner = slice(0, 5) if convention == "standard" else slice(1, 6)
-    by_a = table_with(convention=convention, sign="a").rows[inner]
-    by_alpha = table_with(convention=convention, sign="alpha").rows[inner]
+    by_a = dh_table(elbow(), "tip", convention=convention, sign="a").rows[inner]
+    by_alpha = dh_table(elbow(), "tip", convention=convention, sign="alpha").rows[inner]
     assert all(row.a >= 0 for row in by_a)
     assert all(row.alpha >= 0 for row in by_alpha)
     assert any(row.alpha < 0 for row in by_a)
@@ -122,9 +118,8 @@ def test_craigs_first_row_and_minimal_slides_are_the_robot(kinds: str, sign: str
     tree = elbow(kinds)
     table = dh_table(tree, "tip", convention="modified", first="joint", sign=sign, slide="minimal")
     assert (table.rows[0].d, table.rows[0].theta) == (0.0, 0.0)
-    np.testing.assert_allclose(
-        table.placement(configurations(6)), chain(tree, "tip").placement(configurations(6)), atol=1e-13
-    )
+    q = configurations(6)
+    np.testing.assert_allclose(table.placement(q), chain(tree, "tip").placement(q), atol=1e-13)
 
 
 def test_a_minimal_slide_has_no_a_on_the_side_of_its_neighbour() -> None:
@@ -139,8 +134,7 @@ def test_a_minimal_slide_has_no_a_on_the_side_of_its_neighbour() -> None:
 
 @pytest.mark.slow
 def test_columns_stand_in_the_order_asked_for() -> None:
-    result = run("ur5", "--like", "ur5", "--columns", "alpha,a,d,theta", "--snap", "1e-6", "--degrees")
-    assert result.code == 0
+    result = good("dh ur5 --like ur5 --columns alpha,a,d,theta --snap 1e-6 --degrees")
     lines = [line.split() for line in result.text.splitlines()]
     assert ["i", "joint", "alpha", "[deg]", "a", "[m]", "d", "[m]", "theta", "[deg]"] in lines
     assert ["1", "shoulder_pan_joint", "90", "0", "0.089159", "q1"] in lines
@@ -165,6 +159,4 @@ def test_a_robot_with_a_published_table_is_told_of_it() -> None:
 
 
 def test_what_like_decides_is_not_decided_twice() -> None:
-    refused = run("ur5", "--like", "ur5", "--sign", "a")
-    assert refused.code == 2
-    assert "--sign does nothing with --like" in refused.err
+    assert "--sign does nothing with --like" in refused("dh ur5 --like ur5 --sign a")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +12,7 @@ from hypothesis import strategies as st
 
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, trees
+from urdfkin.dh import table_from_rows
 from urdfkin.dh.convert import to_convention, to_tree
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.table import Convention, DHRow, DHTable
@@ -22,10 +26,8 @@ conventions = st.sampled_from(["standard", "modified"])
 def agree(first: FloatArray, second: FloatArray, table: DHTable, q: FloatArray) -> bool:
     metres, radians = table.tolerance(q)
     error = np.abs(first - second)
-    return bool(
-        (error[..., :3, 3].max(axis=-1) <= 3 * metres).all()
-        and (error[..., :3, :3].max(axis=(-1, -2)) <= 3 * radians).all()
-    )
+    lengths, turns = error[..., :3, 3].max(axis=-1), error[..., :3, :3].max(axis=(-1, -2))
+    return bool((lengths <= 3 * metres).all() and (turns <= 3 * radians).all())
 
 
 def same_cells(first: DHTable, second: DHTable) -> bool:
@@ -36,9 +38,7 @@ def same_cells(first: DHTable, second: DHTable) -> bool:
 @pytest.mark.slow
 @given(trees(), conventions, st.sampled_from(["tip", "flange"]))
 @settings(max_examples=50)
-def test_one_convention_to_the_other_and_back_is_the_same_table(
-    tree: KinematicTree, convention: str, last: str
-) -> None:
+def test_a_convention_to_the_other_and_back_is_the_same_table(tree: Any, convention: str, last: str) -> None:
     table = dh_table(tree, "tip", convention=convention, last=last)
     other = "modified" if convention == "standard" else "standard"
     there = to_convention(table, other)
@@ -57,12 +57,12 @@ def test_a_table_as_a_tree_places_the_tip_alike_in_pinocchio(tree: KinematicTree
     robot = to_tree(table)
     tip = robot.links[robot.frame_link("tip")]
     q = configurations(robot.nq, 4)
-    own = chain(robot, tip).coupling.select(robot, q)
-    assert set(chain(robot, tip).joint_names) == set(table.joint_names)
-    order = [chain(robot, tip).joint_names.index(name) for name in table.joint_names]
-    assert agree(
-        table.placement(own[:, order]), TreeOracle(robot).placement(q, tip, robot.links[0]), table, own
-    )
+    path = chain(robot, tip)
+    own = path.coupling.select(robot, q)
+    assert set(path.joint_names) == set(table.joint_names)
+    order = [path.joint_names.index(name) for name in table.joint_names]
+    theirs = TreeOracle(robot).placement(q, tip, robot.links[0])
+    assert agree(table.placement(own[:, order]), theirs, table, own)
 
 
 @pytest.mark.slow
@@ -75,20 +75,15 @@ def test_a_table_from_the_tree_of_a_table_is_as_exact(tree: KinematicTree, conve
     assert agree(table.placement(q), again.placement(q), table, q)
 
 
+#: The Stanford arm.
 STANFORD = [
-    (0.0, -np.pi / 2, 0.412, 0.0, "R"),
-    (0.0, np.pi / 2, 0.154, 0.0, "R"),
-    (0.0203, 0.0, 0.0, -np.pi / 2, "P"),
-    (0.0, -np.pi / 2, 0.0, 0.0, "R"),
-    (0.0, np.pi / 2, 0.0, 0.0, "R"),
-    (0.0, 0.0, 0.0, 0.0, "R"),
-]
+    [0, "-pi/2", 0.412, 0], [0, "pi/2", 0.154, 0], [0.0203, 0, 0, "-pi/2", "P"], [0, "-pi/2", 0, 0],
+    [0, "pi/2", 0, 0], [0, 0, 0, 0],
+]  # fmt: skip
 
 
 def test_the_stanford_arm_survives_the_way_to_a_tree_and_back_cell_by_cell() -> None:
-    kinds = {"R": JointKind.REVOLUTE, "P": JointKind.PRISMATIC}
-    rows = tuple(DHRow(*row[:4], kinds[row[4]], f"j{i}") for i, row in enumerate(STANFORD))
-    table = DHTable(Convention.STANDARD, rows)
+    table = table_from_rows(STANFORD, "standard")
     again = dh_table(to_tree(table), "tip")
     assert same_cells(table, again)
     np.testing.assert_allclose(again.base, np.eye(4), atol=1e-15)
@@ -114,16 +109,9 @@ def test_a_leader_off_the_path_stays_a_coordinate_in_the_tree() -> None:
     ],
 )
 def test_an_inconsistent_row_is_refused(change: dict[str, object], message: str) -> None:
-    fields: dict[str, object] = {
-        "a": 0.0,
-        "alpha": 0.0,
-        "d": 0.0,
-        "theta": 0.0,
-        "kind": JointKind.REVOLUTE,
-        "joint": "j",
-    }
+    row = DHRow(0.0, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "j")
     with pytest.raises(InputError, match=message):
-        DHRow(**{**fields, **change})  # type: ignore[arg-type]
+        replace(row, **change)  # type: ignore[arg-type]
 
 
 def test_two_rows_of_one_joint_and_a_bent_base_are_refused() -> None:

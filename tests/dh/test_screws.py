@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from scipy.linalg import expm
 from tests.cli.running import good
 from tests.random_chains import trees
 from urdfkin.dh.export.toolboxes import write_screws
-from urdfkin.dh.screws import ProductOfExponentials, screws_from, screws_of
+from urdfkin.dh.screws import screws_from, screws_of
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import chain
@@ -29,13 +30,9 @@ from urdfkin.verify.tables import TableError
 #: H2 = 95.
 M: list[list[float]] = [[-1, 0, 0, 0.817], [0, 0, 1, 0.191], [0, 1, 0, -0.006], [0, 0, 0, 1]]
 SPACE: list[list[float]] = [
-    [0, 0, 1, 0, 0, 0],
-    [0, 1, 0, -0.089, 0, 0],
-    [0, 1, 0, -0.089, 0, 0.425],
-    [0, 1, 0, -0.089, 0, 0.817],
-    [0, 0, -1, -0.109, 0.817, 0],
-    [0, 1, 0, 0.006, 0, 0.817],
-]
+    [0, 0, 1, 0, 0, 0], [0, 1, 0, -0.089, 0, 0], [0, 1, 0, -0.089, 0, 0.425], [0, 1, 0, -0.089, 0, 0.817],
+    [0, 0, -1, -0.109, 0.817, 0], [0, 1, 0, 0.006, 0, 0.817],
+]  # fmt: skip
 
 
 def exponential(screws: FloatArray, q: FloatArray) -> FloatArray:
@@ -49,13 +46,10 @@ def exponential(screws: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def test_the_books_ur5_is_where_the_book_says() -> None:
-    arm = screws_from(SPACE, M)
-    T = arm.placement([0, -np.pi / 2, 0, 0, np.pi / 2, 0])
-    np.testing.assert_allclose(
-        T, np.array([[0, -1, 0, 0.095], [1, 0, 0, 0.109], [0, 0, 1, 0.988], [0, 0, 0, 1.0]]), atol=1e-15
-    )
-    robot = load(arm)
-    np.testing.assert_allclose(robot.placement([0, -np.pi / 2, 0, 0, np.pi / 2, 0], "tip"), T, atol=1e-15)
+    arm, q = screws_from(SPACE, M), [0, -np.pi / 2, 0, 0, np.pi / 2, 0]
+    T = np.array([[0, -1, 0, 0.095], [1, 0, 0, 0.109], [0, 0, 1, 0.988], [0, 0, 0, 1.0]])
+    np.testing.assert_allclose(arm.placement(q), T, atol=1e-15)
+    np.testing.assert_allclose(load(arm).placement(q, "tip"), arm.placement(q), atol=1e-15)
 
 
 @pytest.mark.slow
@@ -79,13 +73,10 @@ def test_a_robots_screws_are_checked_and_lead_back(name: str) -> None:
     screws = robot.screws()
     again = load(screws)
     assert again.tree.links[0] == robot.base_frame
-    q = robot.sample(5, seed=1)
-    values = screws.coupling.values(screws.coupling.select(robot.tree, q))
-    free = ProductOfExponentials(screws.joints, screws.M, screws.space)
-    free = screws_from(free.space, free.M, joints=[joint.name for joint in screws.joints])
-    np.testing.assert_allclose(
-        free.placement(values), screws.placement(screws.coupling.select(robot.tree, q)), atol=1e-14
-    )
+    own = screws.coupling.select(robot.tree, robot.sample(5, seed=1))
+    free = screws_from(screws.space, screws.M, joints=[joint.name for joint in screws.joints])
+    found = free.placement(screws.coupling.values(own))
+    np.testing.assert_allclose(found, screws.placement(own), atol=1e-14)
 
 
 def test_a_wrong_screw_is_found_by_pinocchio() -> None:
@@ -94,12 +85,7 @@ def test_a_wrong_screw_is_found_by_pinocchio() -> None:
     wrong = np.array(screws.space)
     wrong[2, 5] += 1e-12
     with pytest.raises(TableError, match="product of exponentials disagrees"):
-        check_screws(
-            robot.verifier,
-            ProductOfExponentials(
-                screws.joints, screws.M, wrong, *("ur5", screws.base_frame, screws.tip_frame)
-            ),
-        )
+        check_screws(robot.verifier, replace(screws, space=wrong))
 
 
 @pytest.mark.parametrize("form", ["toml", "json"])
@@ -121,15 +107,13 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
     names: dict[str, Any] = {}
     exec(write_screws(arm, "numpy"), names)
     np.testing.assert_array_equal(names["Slist"], np.transpose(SPACE))
-    np.testing.assert_allclose(
-        names["M"] @ exponential(names["Blist"].T, np.ones(6)), arm.placement(np.ones(6)), atol=1e-14
-    )
+    T = arm.placement(np.ones(6))
+    np.testing.assert_allclose(names["M"] @ exponential(names["Blist"].T, np.ones(6)), T, atol=1e-14)
     # ik-geo's form: positions P between the axes H, turned one after the other.
     R, p = np.eye(3), names["P"][0]
     for h, between in zip(names["H"], names["P"][1:], strict=True):
         R = R @ exp_rotation(h)
         p = p + R @ between
-    T = arm.placement(np.ones(6))
     np.testing.assert_allclose(p, T[:3, 3], atol=1e-14)
     np.testing.assert_allclose(R @ names["R6T"], T[:3, :3], atol=1e-14)
     assert json.loads(write_screws(arm, "json"))["space"] == SPACE
@@ -137,13 +121,8 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
     if octave := shutil.which("octave-cli"):
         (tmp_path / "robot_screws.m").write_text(write_screws(arm, "matlab"))
         script = "[M, S, B] = robot_screws(); printf('%.17g ', S(:), M(:))"
-        out = subprocess.run(
-            [octave, "-q", "--eval", script], cwd=tmp_path, capture_output=True, text=True, check=True
-        )
-        assert np.fromstring(out.stdout, sep=" ").tolist() == [
-            *np.array(SPACE).ravel(),
-            *np.array(M).T.ravel(),
-        ]
+        out = subprocess.check_output([octave, "-q", "--eval", script], cwd=tmp_path, text=True)
+        assert np.fromstring(out, sep=" ").tolist() == [*np.ravel(SPACE), *np.transpose(M).ravel()]
 
 
 @pytest.mark.parametrize(

@@ -71,51 +71,41 @@ def test_a_file_is_read_by_its_ending(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "message"),
+    ("changes", "message"),
     [
-        ({"rows": ROWS}, "does not name its convention"),
-        ({"convention": "dh", "rows": ROWS}, "unknown convention: found 'dh'"),
-        (
-            {"convention": "standard", "rows": ROWS, "anlges": "degrees"},
-            "unknown key in a table: found 'anlges'",
-        ),
-        ({"convention": "standard"}, "needs a list of rows"),
-        (
-            {"convention": "standard", "rows": [[1, 2, 3]]},
-            r"row 1: a row must be a mapping or \[a, alpha, d, theta",
-        ),
-        (
-            {"convention": "standard", "rows": [[0, 0, 0, 0, "X"]]},
-            "row 1, kind: the kind of a row must be revolute, continuous or prismatic",
-        ),
-        ({"convention": "standard", "rows": [{"a": 0, "alhpa": 1}]}, "unknown key in a row: found 'alhpa'"),
-        ({"convention": "standard", "rows": [{"a": "wide"}]}, "row 1, a: this is not a number: found 'wide'"),
-        ({"convention": "standard", "rows": [{"a": 0, "sense": 0}]}, "`sense` must be"),
-        (
-            {"convention": "standard", "rows": ROWS, "base": [[1, 0], [0, 1]]},
-            "base: the base must be a matrix of numbers, 4 x 4",
-        ),
-        ({"convention": "standard", "rows": ROWS, "tool": "none"}, "the tool must be a matrix of numbers"),
-        ({"convention": "standard", "rows": [{"mimic": "j1"}]}, "`mimic` must have the form {leader"),
+        ({"convention": None}, "does not name its convention"),
+        ({"convention": "dh"}, "unknown convention: found 'dh'"),
+        ({"anlges": "degrees"}, "unknown key in a table: found 'anlges'"),
+        ({"rows": None}, "needs a list of rows"),
+        ({"rows": [[1, 2, 3]]}, r"row 1: a row must be a mapping or \[a, alpha, d, theta"),
+        ({"rows": [[0, 0, 0, 0, "X"]]}, "row 1, kind: the kind of a row must be revolute, continuous or"),
+        ({"rows": [{"a": 0, "alhpa": 1}]}, "unknown key in a row: found 'alhpa'"),
+        ({"rows": [{"a": "wide"}]}, "row 1, a: this is not a number: found 'wide'"),
+        ({"rows": [{"a": 0, "sense": 0}]}, "`sense` must be"),
+        ({"base": [[1, 0], [0, 1]]}, "base: the base must be a matrix of numbers, 4 x 4"),
+        ({"tool": "none"}, "the tool must be a matrix of numbers"),
+        ({"rows": [{"mimic": "j1"}]}, "`mimic` must have the form {leader"),
     ],
 )
-def test_an_inconsistent_table_says_where(data: dict[str, object], message: str) -> None:
+def test_an_inconsistent_table_says_where(changes: dict[str, object], message: str) -> None:
+    """What is changed to None is left out."""
+    data = {"convention": "standard", "rows": ROWS} | changes
     with pytest.raises(InputError, match=message):
-        table_from_mapping(data)
+        table_from_mapping({key: value for key, value in data.items() if value is not None})
 
 
 def test_a_broken_or_missing_file_is_named(tmp_path: Path) -> None:
-    (tmp_path / "broken.toml").write_text("rows = [")
-    with pytest.raises(InputError, match=r"broken.toml: not valid TOML"):
-        read_table(tmp_path / "broken.toml")
+    bad = 'convention = "standard"\nrows = [["x", 0, 0, 0]]'
+    for name, text, message in (
+        ("broken.toml", "rows = [", "broken.toml: not valid TOML"),
+        ("arm.xls", "", "must have the suffix .toml, .json, .csv, .tsv"),
+        ("bad.toml", bad, "bad.toml, row 1, a: this is not a number"),
+    ):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InputError, match=message):
+            read_table(tmp_path / name)
     with pytest.raises(SourceError, match="cannot be read"):
         read_table(tmp_path / "missing.toml")
-    (tmp_path / "arm.xls").write_text("")
-    with pytest.raises(InputError, match=r"must have the suffix .toml, .json, .csv, .tsv"):
-        read_table(tmp_path / "arm.xls")
-    (tmp_path / "bad.toml").write_text('convention = "standard"\nrows = [["x", 0, 0, 0]]')
-    with pytest.raises(InputError, match=r"bad.toml, row 1, a: this is not a number"):
-        read_table(tmp_path / "bad.toml")
 
 
 # -- tables are read as people have them: spreadsheets, READMEs, papers, web pages, what programs print ------
@@ -190,10 +180,9 @@ def test_a_sheet_is_read_as_its_author_meant_it(name: str, tmp_path: Path) -> No
 
 def test_the_sign_of_a_variable_is_the_rows_sense() -> None:
     assert table_from_text(SHEETS["paper.tex"][0], ".tex").rows[1].sense == -1
-    table = table_from_text(
-        'convention = "standard"\nrows = [{theta = "-q1 + 90 deg", d = "107 mm"}]', ".toml"
-    )
-    assert (table.rows[0].sense, table.rows[0].theta, table.rows[0].d) == (-1, math.pi / 2, 0.107)
+    text = 'convention = "standard"\nrows = [{theta = "-q1 + 90 deg", d = "107 mm"}]'
+    (row,) = table_from_text(text, ".toml").rows
+    assert (row.sense, row.theta, row.d) == (-1, math.pi / 2, 0.107)
 
 
 @pytest.mark.slow
@@ -201,9 +190,8 @@ def test_the_sign_of_a_variable_is_the_rows_sense() -> None:
 @pytest.mark.parametrize("name", references())
 def test_what_urdfkin_prints_is_read_again(name: str, form: str) -> None:
     table = read_table(reference_path(name))
-    endings = {"terminal": ".txt", "markdown": ".md", "latex": ".tex", "csv": ".csv"}
     for units in (units_of(), units_of("degrees", "millimetres")):
-        again = table_from_text(export(table, form, units), endings[form])
+        again = table_from_text(export(table, form, units), SUFFIXES[form])
         for one in ("robot", "base_frame", "tip_frame", "convention"):
             assert getattr(again, one) == getattr(table, one)
         assert [row.joint for row in again.rows] == [row.joint for row in table.rows]
@@ -218,17 +206,11 @@ def test_a_robot_called_robot_is_no_key_of_a_sheet() -> None:
 
 
 @pytest.mark.slow
-@given(
-    trees(min_joints=1),
-    st.sampled_from(["standard", "modified"]),
-    st.sampled_from(["terminal", "markdown"]),
-)
+@given(trees(min_joints=1), *map(st.sampled_from, (("standard", "modified"), ("terminal", "markdown"))))
 @settings(max_examples=40)
 def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: str, form: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
-    again = table_from_text(
-        export(table, form, units_of(digits=17)), {"terminal": ".txt", "markdown": ".md"}[form]
-    )
+    again = table_from_text(export(table, form, units_of(digits=17)), SUFFIXES[form])
     assert again.joint_names == table.joint_names
     q = np.linspace(-1, 1, len(table.joint_names))
     np.testing.assert_allclose(again.placement(q), table.placement(q), atol=1e-8 * max(1.0, table.span))
@@ -239,10 +221,7 @@ def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: 
     [
         ("i  a  alpha  d  theta\n1  0  pi/2  0.1  q1\n", "does not name its convention"),
         ("# anlges: degrees\na,alpha,d,theta\n0,0,0,0\n", "unknown key in a table: found 'anlges'"),
-        (
-            'a,alpha,d,theta\n"0,3",0,0,0\n',
-            "row 1, a: this is not a number.*by semicolons if commas are decimal",
-        ),
+        ('a,alpha,d,theta\n"0,3",0,0,0\n', "row 1, a: this is not a number.*by semicolons if commas are"),
         ("a;alpha;d;phi\n0;0;0;0\n", "header: the table has no column 'theta'"),
         ("a;alpha;d;theta\n0;0;0\n", "row 1: a row needs a cell for each of the 4 columns: found 3"),
         ("a;alpha;d;theta\n0;q1;0;0\n", "joint variable belongs in theta of a revolute joint, or in d"),
@@ -306,9 +285,8 @@ def test_a_table_given_as_robot_is_written_as_it_stands(tmp_path: Path) -> None:
     "header", ["a;alpha,d,theta", "a,alpha;d,theta", "a_i;alpha,d,theta", "a|alpha,d,theta"]
 )
 def test_headings_with_mixed_separators_are_refused(header: str) -> None:
-    with pytest.raises(
-        InputError, match="the line of column headings has another separator than the other lines"
-    ):
+    words = "the line of column headings has another separator than the other lines"
+    with pytest.raises(InputError, match=words):
         table_from_text(f"# convention: standard\n{header}\n0,pi/2,0.1,0\n", ".csv")
 
 
@@ -328,10 +306,7 @@ def test_a_base_with_an_infinite_number_is_refused(number: str) -> None:
 
 @pytest.mark.parametrize("form", ["to_markdown", "to_latex", "to_html"])
 def test_a_table_in_a_form_has_radians_metres_and_ten_digits_unless_asked(form: str) -> None:
-    table = table_from_rows(
-        [{"a": math.sqrt(2.0), "alpha": 0.1, "d": math.sqrt(0.5), "theta": 0.0}], "standard"
-    )
-    write = getattr(table, form)
+    write = getattr(table_from_rows([[math.sqrt(2.0), 0.1, math.sqrt(0.5), 0.0]], "standard"), form)
     assert write() == write("radians", "metres", 10)
     assert "1.4142135624" not in write()
     assert "1.4142135624" in write(digits=11)
@@ -344,13 +319,8 @@ PIECES = (
 )
 #: For each format of `export`: the suffix of its files.
 SUFFIXES = {
-    "csv": ".csv",
-    "markdown": ".md",
-    "latex": ".tex",
-    "terminal": ".txt",
-    "toml": ".toml",
-    "json": ".json",
-}
+    "csv": ".csv", "markdown": ".md", "latex": ".tex", "terminal": ".txt", "toml": ".toml", "json": ".json",
+}  # fmt: skip
 
 
 @cache

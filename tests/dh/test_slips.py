@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.test_dh import run
+from tests.cli.test_dh import UR5, run
 from tests.dh.test_compare import elbow
 from tests.reading import present
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
@@ -101,25 +101,18 @@ def test_the_fewest_slips_are_tried_first() -> None:
 def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> None:
     file = tmp_path / "ur5.toml"
     rows: list[list[float]] = [
-        [0, 90, 89.159],
-        [-425, 0, 0],
-        [-392.25, 0, 0],
-        [0, 90, 109.15],
-        [0, -90, 94.65],
-        [0, 0, 82.3],
-    ]
-    text = "rows = [" + ", ".join(f"{[*row, 0]}" for row in rows) + "]\n"
-    arguments = ("ur5", "--base", "base", "--tip", "tool0", "--compare", str(file))
+        [0, 90, 89.159], [-425, 0, 0], [-392.25, 0, 0], [0, 90, 109.15], [0, -90, 94.65], [0, 0, 82.3],
+    ]  # fmt: skip
+    text = f"rows = {[[*row, 0] for row in rows]}\n"
     file.write_text('convention = "modified"\nangles = "degrees"\n' + text)
-    result = run(*arguments)
+    result = run(*UR5, "--compare", str(file))
     assert result.code == 1
     assert "rad when it is read as standard, millimetres\n" in result.text
     file.write_text('convention = "standard"\n' + text)
-    refused = run(*arguments)
+    refused = run(*UR5, "--compare", str(file))
     assert refused.code == 2
-    assert re.search(
-        "more than one turn.*the table agrees with the URDF to .* read as millimetres, degrees", refused.err
-    )
+    words = "more than one turn.*the table agrees with the URDF to .* read as millimetres, degrees"
+    assert re.search(words, refused.err)
 
 
 def test_a_table_alone_is_doubted_only_where_it_cannot_be_meant() -> None:
@@ -143,36 +136,26 @@ def test_load_warns_of_a_table_in_millimetres() -> None:
         load(table_from_rows([[0.425, 0, 0, 0], [0.39225, 0, 0, 0]], "standard"), verify=False)
 
 
-ROWS: dict[str, list[list[Any]]] = {
-    "standard": [
-        [0, "pi/2", 0.089159], [-0.425, 0, 0], [-0.39225, 0, 0], [0, "pi/2", 0.10915], [0, "-pi/2", 0.09465],
-        [0, 0, 0.0823],
-    ],
-    "modified": [
-        [0, 0, 0.089159], [0, "pi/2", 0], [-0.425, 0, 0], [-0.39225, 0, 0.10915], [0, "pi/2", 0.09465],
-        [0, "-pi/2", 0.0823],
-    ],
-}  # fmt: skip
-UR5 = ("ur5", "--base", "base", "--tip", "tool0")
+#: a and alpha, which the modified convention writes a row later, and d, of the UR5.
+LINKS: list[list[Any]] = [[0, "pi/2"], [-0.425, 0], [-0.39225, 0], [0, "pi/2"], [0, "-pi/2"]]
+OFFSETS = [0.089159, 0, 0, 0.10915, 0.09465, 0.0823]
 
 
 def nameless(file: Path, convention: str) -> Path:
-    rows = [[*row, 0] for row in ROWS[convention]]
+    links = [*LINKS, [0, 0]] if convention == "standard" else [[0, 0], *LINKS]
+    rows = [[*link, d, 0] for link, d in zip(links, OFFSETS, strict=True)]
     file.write_text(f"rows = {json.dumps(rows)}\n")
     return file
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_a_table_that_names_no_convention_is_compared_in_the_one_that_fits(
-    tmp_path: Path, convention: str
-) -> None:
-    file = nameless(tmp_path / "ur5.toml", convention)
-    result = run(*UR5, "--compare", str(file))
+def test_a_table_without_convention_is_compared_in_the_one_that_fits(tmp_path: Path, convention: str) -> None:
+    words = *UR5, "--compare", str(nameless(tmp_path / "ur5.toml", convention))
+    result = run(*words)
     assert result.code == 0
     assert f"The table names no convention; {convention} fits best." in result.text
-    data = json.loads(run(*UR5, "--compare", str(file), "--format", "json").text)
-    assert data["read_as"] == convention
+    assert run(*words, "--format", "json").data["read_as"] == convention
 
 
 @pytest.mark.slow
@@ -181,9 +164,8 @@ def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> No
     file.write_text(file.read_text().replace('"-pi/2"', "-90").replace('"pi/2"', "90"))
     refused = run(*UR5, "--compare", str(file))
     assert refused.code == 2
-    assert re.search(
-        "more than one turn.*the table agrees with the URDF to .* when it is read as degrees", refused.err
-    )
+    words = "more than one turn.*the table agrees with the URDF to .* when it is read as degrees"
+    assert re.search(words, refused.err)
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +12,13 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.dh.arms import arm
-from tests.random_chains import configurations, rotation, shift, trees
+from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from tests.reading import present
 from urdfkin.dh import DHTable, dh_table
 from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.table import SnapChange, SnapReport
 from urdfkin.model.chain import chain
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, build_tree
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -29,23 +30,17 @@ def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) 
     for _ in range(joints):
         turn = rotation("xyz"[rng.integers(3)], rng.integers(-3, 4) * math.pi / rng.choice([2, 4, 6]))
         off = rotation("x", rng.uniform(-noise, noise)) @ rotation("y", rng.uniform(-noise, noise))
-        steps.append(
-            shift(*rng.choice([0.0, 0.1, 0.25, -0.3], 3))
-            @ turn
-            @ off
-            @ rotation("z", rng.uniform(-noise, noise))
-        )
+        step = shift(*rng.choice([0.0, 0.1, 0.25, -0.3], 3)) @ turn @ off
+        steps.append(step @ rotation("z", rng.uniform(-noise, noise)))
     kinds = "".join(rng.choice(list("RRP" if slides else "R"), joints))
     return arm(*steps, kinds=kinds, tip=shift(0.1, 0, 0.2) @ rotation("x", rng.uniform(-noise, noise)))
 
 
 def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    exact = chain(tree, "tip").placement(q)
-    found = table.placement(q)
-    return (
-        np.linalg.norm(found[..., :3, 3] - exact[..., :3, 3], axis=-1),
-        rotation_angle(found[..., :3, :3], exact[..., :3, :3]),
-    )
+    """How far the tip is off, and turned."""
+    exact, found = chain(tree, "tip").placement(q), table.placement(q)
+    metres = np.linalg.norm(found[..., :3, 3] - exact[..., :3, 3], axis=-1)
+    return metres, rotation_angle(found[..., :3, :3], exact[..., :3, :3])
 
 
 @pytest.mark.slow
@@ -55,9 +50,7 @@ def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArra
     st.sampled_from(["standard", "modified"]),
 )
 @settings(max_examples=50)
-def test_no_configuration_moves_the_tip_by_more_than_declared(
-    seed: int, noise: float, convention: str
-) -> None:
+def test_no_configuration_moves_the_tip_by_more_than_declared(seed: int, noise: Any, convention: Any) -> None:
     tree = nearly_round(seed, noise)
     table = dh_table(tree, "tip", convention=convention, snap=3 * noise)
     assert table.snap is not None
@@ -142,14 +135,10 @@ def test_a_change_moves_the_tip_by_its_angle_times_its_lever() -> None:
 
 
 def test_an_angle_at_the_first_joint_is_seen_along_the_whole_way_and_one_at_the_last_along_the_rest() -> None:
-    quarter = math.pi / 2
-    for tilts, lever in [((OFF, 0.0), 3.0 + 0.5), ((0.0, OFF), 0.5)]:
-        tree = arm(
-            np.eye(4),
-            shift(0, 0, 1.0) @ rotation("x", quarter + tilts[0]),
-            shift(3.0, 0, 0) @ rotation("x", quarter + tilts[1]),
-            tip=shift(0, 0.5, 0),
-        )
+    for (first, last), lever in [((OFF, 0.0), 3.0 + 0.5), ((0.0, OFF), 0.5)]:
+        bent = (rotation("x", math.pi / 2 + tilt) for tilt in (first, last))
+        steps = (way @ turn for way, turn in zip((shift(0, 0, 1.0), shift(3.0, 0, 0)), bent, strict=True))
+        tree = arm(np.eye(4), *steps, tip=shift(0, 0.5, 0))
         snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
         assert snap.radians == pytest.approx(OFF, rel=1e-9)
         assert snap.metres == pytest.approx(OFF * lever, rel=1e-9)
@@ -159,13 +148,12 @@ def test_an_angle_at_the_first_joint_is_seen_along_the_whole_way_and_one_at_the_
 @pytest.mark.parametrize("beyond", [0.0, 3.0])
 def test_an_angle_made_of_two_fixed_ones_is_seen_from_the_joint_behind_it(beyond: float) -> None:
     """Neither origin is nearly round, both together are."""
-    z = np.array([0.0, 0.0, 1.0])
     joints = [
-        (Joint("a", JointKind.REVOLUTE, 0, np.eye(4), z), "l0", "l1"),
-        (Joint("bolt", JointKind.FIXED, 0, rotation("x", 0.3), z), "l1", "l2"),
-        (Joint("b", JointKind.REVOLUTE, 0, rotation("x", math.pi / 2 - 0.3 + OFF), z), "l2", "l3"),
-        (Joint("c", JointKind.REVOLUTE, 0, shift(beyond, 0, 0), z), "l3", "l4"),
-        (Joint("end", JointKind.FIXED, 0, shift(0, 0.5, 0), z), "l4", "tip"),
+        (z_joint("a"), "l0", "l1"),
+        (z_joint("bolt", rotation("x", 0.3), JointKind.FIXED), "l1", "l2"),
+        (z_joint("b", rotation("x", math.pi / 2 - 0.3 + OFF)), "l2", "l3"),
+        (z_joint("c", shift(beyond, 0, 0)), "l3", "l4"),
+        (z_joint("end", shift(0, 0.5, 0), JointKind.FIXED), "l4", "tip"),
     ]
     snap = present(dh_table(build_tree("bolted", "l0", joints), "tip", snap=10 * OFF).snap)
     assert [change.lever for change in snap.changes] == [pytest.approx(beyond + 0.5)]
@@ -175,11 +163,10 @@ def test_an_angle_made_of_two_fixed_ones_is_seen_from_the_joint_behind_it(beyond
 
 def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
     """A tilt before a joint that turns, then one that slides, then 2 m to the tip."""
-    z = np.array([0.0, 0.0, 1.0])
     joints = [
-        (Joint("a", JointKind.REVOLUTE, 0, rotation("x", math.pi / 2 + tilt), z), "l0", "l1"),
-        (Joint("b", JointKind.PRISMATIC, 0, rotation("y", math.pi / 2), z, limit), "l1", "l2"),
-        (Joint("end", JointKind.FIXED, 0, shift(0, 0, 2.0), z), "l2", "tip"),
+        (z_joint("a", rotation("x", math.pi / 2 + tilt)), "l0", "l1"),
+        (z_joint("b", rotation("y", math.pi / 2), JointKind.PRISMATIC, limit=limit), "l1", "l2"),
+        (z_joint("end", shift(0, 0, 2.0), JointKind.FIXED), "l2", "tip"),
     ]
     return build_tree("sliding", "l0", joints)
 
@@ -202,9 +189,8 @@ def test_a_statement_adds_up_what_is_said_of_each_change() -> None:
 
 
 def test_what_several_changes_move_for_each_metre_of_a_slider_adds_up() -> None:
-    tree = arm(
-        rotation("x", math.pi / 2 + OFF), shift(1.0, 0, 0) @ rotation("x", math.pi / 2 + 2 * OFF), kinds="RP"
-    )
+    slide = shift(1.0, 0, 0) @ rotation("x", math.pi / 2 + 2 * OFF)
+    tree = arm(rotation("x", math.pi / 2 + OFF), slide, kinds="RP")
     snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
     assert snap.per_metre == {"j2": pytest.approx(3 * OFF, rel=1e-9)}
 

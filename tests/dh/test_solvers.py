@@ -25,16 +25,19 @@ H = math.pi / 2
 NAMES = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
 
 
+def drawn(rng: np.random.Generator) -> dict[str, float]:
+    """The lengths of an arm."""
+    lengths = rng.uniform([-0.4, -0.4, -0.3, 0.1, 0.3, 0.3, 0.05], [0.4, 0.4, 0.3, 0.6, 0.9, 0.9, 0.2])
+    return dict(zip(NAMES, lengths.tolist(), strict=True))
+
+
 def table(lengths: dict[str, float], offsets: list[float], signs: list[int], tilt: float = 0.0) -> DHTable:
     """The arm of the parameters, written as Brandstoetter's drawing has it."""
     cells = [
-        (lengths["a1"], -H, lengths["c1"], 0.0),
-        (lengths["c2"], tilt, 0.0, -H),
-        (lengths["a2"], H, lengths["b"], H),
-        (0.0, -H, lengths["c3"], 0.0),
-        (0.0, H, 0.0, 0.0),
+        (lengths["a1"], -H, lengths["c1"], 0.0), (lengths["c2"], tilt, 0.0, -H),
+        (lengths["a2"], H, lengths["b"], H), (0.0, -H, lengths["c3"], 0.0), (0.0, H, 0.0, 0.0),
         (0.0, 0.0, lengths["c4"], 0.0),
-    ]
+    ]  # fmt: skip
     rows = [
         {"a": a, "alpha": alpha, "d": d, "theta": math.remainder(theta - offset, 2 * math.pi), "sense": sign}
         for (a, alpha, d, theta), offset, sign in zip(cells, offsets, signs, strict=True)
@@ -46,8 +49,7 @@ def table(lengths: dict[str, float], offsets: list[float], signs: list[int], til
 @pytest.mark.parametrize("seed", range(10))
 def test_the_parameters_of_any_arm_come_back(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    drawn = rng.uniform([-0.4, -0.4, -0.3, 0.1, 0.3, 0.3, 0.05], [0.4, 0.4, 0.3, 0.6, 0.9, 0.9, 0.2])
-    lengths = dict(zip(NAMES, drawn.tolist(), strict=True))
+    lengths = drawn(rng)
     for name in rng.choice(["a1", "a2", "b"], seed % 3, replace=False):
         lengths[str(name)] = 0.0
     signs = [int(s) for s in rng.choice([-1, 1], 6)]
@@ -56,9 +58,8 @@ def test_the_parameters_of_any_arm_come_back(seed: int) -> None:
     found = opw_of(path)
     q = rng.uniform(-3, 3, (50, 6))
     np.testing.assert_allclose(found.placement(q), path.placement(q), atol=1e-12)
-    assert {name: abs(x) for name, x in found.lengths.items()} == pytest.approx(
-        {name: abs(x) for name, x in lengths.items()}, abs=1e-12
-    )
+    ours, theirs = ({name: abs(x) for name, x in each.items()} for each in (found.lengths, lengths))
+    assert ours == pytest.approx(theirs, abs=1e-12)
     assert min(found.lengths[name] for name in ("c1", "c2", "c3")) >= 0.0
 
 
@@ -84,11 +85,8 @@ def test_the_command_writes_what_the_solvers_read(tmp_path: Path) -> None:
     result = good("structure kinova --opw 0.001")
     assert "is off by at most" in result.text + result.err
     lines = dict(line.split(": ", 1) for line in result.text.splitlines() if line.startswith("opw_"))
-    assert sorted(lines) == [
-        "opw_kinematics_geometric_parameters",
-        "opw_kinematics_joint_offsets",
-        "opw_kinematics_joint_sign_corrections",
-    ]
+    named = ("geometric_parameters", "joint_offsets", "joint_sign_corrections")
+    assert sorted(lines) == [f"opw_kinematics_{name}" for name in named]
     signs = tomllib.loads(f"x = {lines['opw_kinematics_joint_sign_corrections']}")["x"]
     assert all(abs(sign) == 1 for sign in signs)
 
@@ -103,8 +101,7 @@ Solve = Callable[[FloatArray], Sequence[Any]]
 def poses(robot: Robot, tip: str, count: int = 10) -> tuple[FloatArray, FloatArray]:
     """Configurations with their tips in the base, both checked against Pinocchio."""
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (count, 6))
-    base = np.linalg.inv(robot.placement(q, robot.base_frame))
-    return q, base @ robot.placement(q, tip)
+    return q, robot.relative_placement(q, tip, robot.base_frame)
 
 
 def check(robot: Robot, tip: str, solve: Solve) -> None:
@@ -112,10 +109,8 @@ def check(robot: Robot, tip: str, solve: Solve) -> None:
     for q, T in zip(*poses(robot, tip), strict=True):
         found = np.array(solve(T)).reshape(-1, 6)
         assert len(found) > 0
-        base = np.linalg.inv(robot.placement(found, robot.base_frame))
-        np.testing.assert_allclose(
-            base @ robot.placement(found, tip), np.broadcast_to(T, (len(found), 4, 4)), atol=1e-10
-        )
+        reached = robot.relative_placement(found, tip, robot.base_frame)
+        np.testing.assert_allclose(reached, np.broadcast_to(T, (len(found), 4, 4)), atol=1e-10)
         apart = np.abs(np.angle(np.exp(1j * (found - q)))).max(axis=-1)
         assert apart.min() < 1e-7
 
@@ -185,9 +180,7 @@ def test_opw_kinematics_solves_for_the_poses_of_a_catalogue_arm() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_opw_kinematics_solves_for_the_poses_of_any_arm_of_the_kind(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    drawn = rng.uniform([-0.4, -0.4, -0.3, 0.1, 0.3, 0.3, 0.05], [0.4, 0.4, 0.3, 0.6, 0.9, 0.9, 0.2])
-    signs = [int(sign) for sign in rng.choice([-1, 1], 6)]
-    lengths = dict(zip(NAMES, drawn.tolist(), strict=True))
+    lengths, signs = drawn(rng), [int(sign) for sign in rng.choice([-1, 1], 6)]
     robot = load(table(lengths, list(rng.uniform(-3, 3, 6)), signs))
     check(robot, "tip", opw_solver(robot, "tip"))
 
@@ -201,5 +194,5 @@ def test_the_robotics_toolbox_solves_with_the_elementary_transforms() -> None:
     q, wanted = poses(robot, "tool0", 5)
     for start, T in zip(q, wanted, strict=True):
         found = scope["ets"].ik_LM(T, q0=start + 0.1, tol=1e-20)
-        base = np.linalg.inv(robot.placement(found[0], robot.base_frame))
-        np.testing.assert_allclose(base @ robot.placement(found[0], "tool0"), T, atol=1e-8)
+        reached = robot.relative_placement(found[0], "tool0", robot.base_frame)
+        np.testing.assert_allclose(reached, T, atol=1e-8)

@@ -10,7 +10,7 @@ import pytest
 from tests.cli.running import good, urdfkin
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
-from urdfkin.dh import DHTable, table_from_rows, to_tree
+from urdfkin.dh import table_from_rows, to_tree
 from urdfkin.dh.screws import screws_of
 from urdfkin.dh.structure import Structure, structure
 from urdfkin.model.chain import chain
@@ -20,13 +20,9 @@ from urdfkin.verify.oracle import QueryBatch
 
 H = math.pi / 2
 PUMA: list[list[float]] = [
-    [0, H, 0, 0],
-    [0.4318, 0, 0, 0],
-    [0.0203, -H, 0.15005, 0],
-    [0, H, 0.4318, 0],
-    [0, -H, 0, 0],
+    [0, H, 0, 0], [0.4318, 0, 0, 0], [0.0203, -H, 0.15005, 0], [0, H, 0.4318, 0], [0, -H, 0, 0],
     [0, 0, 0, 0],
-]
+]  # fmt: skip
 
 
 def of_tree(tree: KinematicTree) -> Structure:
@@ -34,8 +30,7 @@ def of_tree(tree: KinematicTree) -> Structure:
 
 
 def of_rows(rows: list[list[object]] | list[list[float]]) -> Structure:
-    table: DHTable = table_from_rows(rows, "standard")
-    return of_tree(to_tree(table))
+    return of_tree(to_tree(table_from_rows(rows, "standard")))
 
 
 def test_a_puma_has_a_spherical_wrist_and_is_what_opw_solves() -> None:
@@ -43,9 +38,8 @@ def test_a_puma_has_a_spherical_wrist_and_is_what_opw_solves() -> None:
     assert [(kind.name, kind.is_exact) for kind in found.kinds] == [("spherical wrist", True)]
     assert found.freedoms == 6
     assert found.solvers[0].startswith("OPW")
-    assert (
-        found.reached <= found.reach == pytest.approx(0.4318 + math.hypot(0.0203, 0.15005) + 0.4318, abs=0.02)
-    )
+    links = 0.4318 + math.hypot(0.0203, 0.15005) + 0.4318
+    assert found.reached <= found.reach == pytest.approx(links, abs=0.02)
 
 
 @pytest.mark.parametrize("offset", [1e-4, 3e-3])
@@ -63,13 +57,9 @@ def test_a_wrist_that_misses_its_point_says_by_how_much(offset: float) -> None:
 @pytest.mark.parametrize("tilt", [0.0, 0.0066])
 def test_three_parallel_axes_are_told_with_their_tilt(tilt: float) -> None:
     rows: list[list[float]] = [
-        [0, H, 0.18, 0],
-        [-0.61, tilt, 0, 0],
-        [-0.57, 0, 0, 0],
-        [0, H, 0.17, 0],
-        [0, -H, 0.12, 0],
+        [0, H, 0.18, 0], [-0.61, tilt, 0, 0], [-0.57, 0, 0, 0], [0, H, 0.17, 0], [0, -H, 0.12, 0],
         [0, 0, 0.1, 0],
-    ]
+    ]  # fmt: skip
     found = of_rows(rows)
     assert found.kinds[0].name == "three parallel axes"
     assert found.kinds[0].radians == pytest.approx(tilt, abs=1e-12)
@@ -99,11 +89,8 @@ def test_a_spherical_joints_centre_stays_where_pinocchio_puts_it(name: str) -> N
     q = np.zeros((20, robot.nq))
     columns = [robot.tree.q_index[robot.tree.joint_index(joint)] for joint in kind.joints]
     q[1:, columns] = np.random.default_rng(0).uniform(-1, 1, (19, 3))
-    base, link = (
-        robot.verifier.oracle().placements(QueryBatch([screws.base_frame, beyond], (q,)))[:, k]
-        for k in (0, 1)
-    )
-    T = np.linalg.inv(base) @ link
+    both = robot.verifier.oracle().placements(QueryBatch([screws.base_frame, beyond], (q,)))
+    T = np.linalg.inv(both[:, 0]) @ both[:, 1]
     local = np.linalg.solve(T[0], [*kind.at, 1.0])
     centres = (T @ local)[:, :3]
     np.testing.assert_allclose(centres, np.broadcast_to(centres[0], (20, 3)), atol=1e-12)

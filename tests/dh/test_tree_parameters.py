@@ -67,12 +67,8 @@ def test_gamma_and_b_are_zero_on_the_first_moving_child(tree: KinematicTree) -> 
 
 
 def test_along_a_chain_the_table_is_the_modified_one() -> None:
-    tree = arm(
-        shift(0, 0, 0.3),
-        shift(0.05, 0, 0.1) @ rotation("x", math.pi / 2),
-        shift(0.4, 0, 0.1),
-        rotation("x", -1.0) @ shift(0.02, 0, 0.3),
-    )
+    bent, last = shift(0.05, 0, 0.1) @ rotation("x", math.pi / 2), rotation("x", -1.0) @ shift(0.02, 0, 0.3)
+    tree = arm(shift(0, 0, 0.3), bent, shift(0.4, 0, 0.1), last)
     modified = dh_table(tree, "tip", convention="modified")
     rows = [row for row in tree_parameters(tree).rows if row.sigma < 2]
     for row, other in zip(rows, modified.rows, strict=True):

@@ -24,9 +24,7 @@ from urdfkin.export.check import check
 #: The folder with a `cuda_runtime.h` for the processor.
 _SHIM = Path(__file__).parent
 _COMPILER = benchmark_gpu.nvcc()
-_NVCC = pytest.mark.skipif(
-    _COMPILER is None, reason="no nvcc; `make nvcc` installs it from the package registry"
-)
+_NVCC = pytest.mark.skipif(_COMPILER is None, reason="no nvcc; `make nvcc` installs it")
 
 
 @pytest.fixture
@@ -54,12 +52,11 @@ def ran(path: Path, *options: str, status: int = 0) -> str:
 @pytest.mark.long
 @pytest.mark.parametrize("sanitizer", ["address,undefined", "thread"])
 @pytest.mark.parametrize("real", ["double", "float"])
-def test_the_kernels_compute_true_values_and_touch_only_their_own_memory(
+def test_kernels_compute_true_values_and_touch_only_their_memory(
     real: str, sanitizer: str, tmp_path: Path
 ) -> None:
-    path = file(
-        code(urdfkin.load("ur5"), quantities=("placement", "jacobian", "acceleration")), "cuda", tmp_path
-    )
+    written = code(urdfkin.load("ur5"), quantities=("placement", "jacobian", "acceleration"))
+    path = file(written, "cuda", tmp_path)
     name = path.stem.upper()
     said = ran(path, f"-fsanitize={sanitizer}", f"-D{name}_MAIN", f"-D{name}_REAL={real}")
     assert len(re.findall(r"^good \w+: 4 test vectors", said, re.MULTILINE)) == 3
@@ -68,18 +65,11 @@ def test_the_kernels_compute_true_values_and_touch_only_their_own_memory(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("robot", "quantities"),
-    [
-        ("planar_two_link", ALL),
-        ("planar_and_floating_in_the_middle", ("placement", "jacobian", "acceleration")),
-        ("single_link", ("placement",)),
-    ],
-)
-def test_so_do_those_of_wide_rows_of_other_joints_and_of_no_joint(
-    robot: str, quantities: tuple[str, ...], tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("robot", ["planar_two_link", "planar_and_floating_in_the_middle", "single_link"])
+def test_so_do_those_of_wide_rows_of_other_joints_and_of_no_joint(robot: str, tmp_path: Path) -> None:
     subject = urdfkin.load(robot) if robot == "planar_two_link" else robot_of(robot)
+    some = {"planar_two_link": ALL, "single_link": ("placement",)}
+    quantities = some.get(robot, ("placement", "jacobian", "acceleration"))
     path = file(code(subject, quantities=quantities), "cuda", tmp_path)
     said = ran(path, "-fsanitize=address,undefined", f"-D{path.stem.upper()}_MAIN")
     assert said.count("good ") == 2 * len(quantities)
@@ -210,17 +200,9 @@ def test_the_benchmark_measures_libraries_of_pytorch_after_a_check(
             list(found)
         return
     rows = list(benchmark_gpu.rows(written, [json.dumps({"bandwidth": 1e9}), *found]))
-    by = {
-        "placement": ("PyTorch", "torch.compile"),
-        "jacobian": ("PyTorch", "torch.compile", "PyTorch Kinematics"),
-    }
-    assert [(x["quantity"], x["by"], x["real"], x["n"]) for x in rows] == [
-        (name, who, real, n)
-        for name, whos in by.items()
-        for who in whos
-        for real in ("double", "float")
-        for n in (1, 3)
-    ]
+    by = [(name, who) for name in ("placement", "jacobian") for who in ("PyTorch", "torch.compile")]
+    expected = product([*by, ("jacobian", "PyTorch Kinematics")], ("double", "float"), (1, 3))
+    assert [((x["quantity"], x["by"]), x["real"], x["n"]) for x in rows] == list(expected)
 
 
 @pytest.mark.parametrize(

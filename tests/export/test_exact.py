@@ -18,13 +18,14 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
+from tests.cli.running import good
 from tests.cli.running import urdfkin as command
 from tests.counted import Counted, Matrix, all_conspiring, deviation, eq
 from tests.export.writing import ALL, code
 from tests.kinematics.test_roundings import PARTS, most, of_sines, theirs, turn
 from tests.laws.subjects import robot_of
 from tests.reading import present
-from tests.urdfs import loaded
 from urdfkin.export import exact as exact_module
 from urdfkin.export import recursion, write
 from urdfkin.export.c import framed
@@ -38,18 +39,15 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.exact.numbers import precision
 
-_ARM = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="{axis}"/>
-  <origin xyz="0.1 0 0.425" rpy="{rpy}"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
-<joint name="k" type="prismatic"><parent link="b"/><child link="c"/><axis xyz="0 -1 0"/>
-  <origin xyz="0 0.3 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-<joint name="m" type="revolute"><parent link="c"/><child link="d"/><axis xyz="0 0 -1"/>
-  <mimic joint="j" multiplier="-0.5" offset="{offset}"/>
-  <limit lower="-4" upper="4" effort="1" velocity="1"/></joint></robot>"""
-
 
 def arm(rpy: str, axis: str = "0 0 1", offset: str = "1.5707963267948966") -> Robot:
-    return loaded(_ARM.format(rpy=rpy, axis=axis, offset=offset))  # an axis that is not a unit vector
+    rule = urdfs.mimic("j", -0.5, offset) + urdfs.limit(-4, 4)
+    joints = (
+        urdfs.joint("j", "revolute", "a", "b", f'xyz="0.1 0 0.425" rpy="{rpy}"', axis, urdfs.limit(-3, 3)),
+        urdfs.joint("k", "prismatic", "b", "c", 'xyz="0 0.3 0"', "0 -1 0", urdfs.limit()),
+        urdfs.joint("m", "revolute", "c", "d", "", "0 0 -1", rule),
+    )
+    return urdfs.loaded(urdfs.robot(*joints, name="arm"))  # an axis that is not a unit vector
 
 
 def algebra(robot: Robot, *quantities: str) -> tuple[Any, dict[str, Any]]:
@@ -73,8 +71,8 @@ def test_expressions_are_equal_to_the_chain_at_fifty_digits(rpy: str, axis: str)
             for vector in found.proof.vectors:
                 true = vector.results[function.name]
                 for x, text in zip(balls(function, vector.inputs), true, strict=True):
-                    difference = abs(x - type(x)(text))
-                    assert difference <= abs(x) * type(x)("1e-49") + type(x)("1e-57"), decimal(x)
+                    room = abs(x) * type(x)("1e-49") + type(x)("1e-57")
+                    assert abs(x - type(x)(text)) <= room, decimal(x)
 
 
 @pytest.mark.slow
@@ -116,17 +114,15 @@ def test_the_file_states_the_angles_that_became_multiples_of_pi() -> None:
 
 @pytest.mark.slow
 def test_the_command_states_the_proof_of_the_exact_expressions(tmp_path: Path) -> None:
-    path = tmp_path / "arm.py"
-    done = command("export", "panda", "--frame", "panda_hand", "--to", "sympy-exact", "-o", str(path))
-    assert done.code == 0
-    assert (
-        "The expressions were evaluated at 50 digits. Constants are the URDF's decimals; 3 diff" in done.err
-    )
-    exact = re.findall(r"worst disagreement (\S+) eps", path.read_text("utf-8"))
+    path, worst = tmp_path / "arm.py", re.compile(r"worst disagreement (\S+) eps")
+    done = good("export panda --frame panda_hand --to sympy-exact -o", str(path))
+    words = "The expressions were evaluated at 50 digits. Constants are the URDF's decimals; 3 diff"
+    assert words in done.err
+    exact = worst.findall(path.read_text("utf-8"))
     assert len(exact) == 3
-    assert re.findall(r"worst disagreement (\S+) eps", done.err) == exact
-    double = command("export", "panda", "--frame", "panda_hand", "--to", "sympy", "-o", str(path)).err
-    assert re.findall(r"worst disagreement (\S+) eps", double) != exact
+    assert worst.findall(done.err) == exact
+    double = good("export panda --frame panda_hand --to sympy -o", str(path)).err
+    assert worst.findall(double) != exact
     assert "evaluated" not in double
 
 
@@ -135,13 +131,9 @@ def test_the_command_reports_exact_expressions_that_were_not_compared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: Any = exact_module.exact_functions
-
-    def unchecked(*given: Any) -> Any:
-        return made(*given[:-1], False)  # the expressions in double precision were compared
-
-    monkeypatch.setattr(exact_module, "exact_functions", unchecked)
-    words = ("export", "planar_two_link", "--to", "sympy-exact", "-o", str(tmp_path / "arm.py"))
-    done = command(*words)
+    # The expressions in double precision were compared.
+    monkeypatch.setattr(exact_module, "exact_functions", lambda *given: made(*given[:-1], False))
+    done = command("export planar_two_link --to sympy-exact -o", str(tmp_path / "arm.py"))
     assert done.code == 3
     assert "NOT VERIFIED" in done.err
     assert "evaluated" not in done.err
@@ -170,13 +162,10 @@ def test_a_double_cannot_enter_an_exact_expression() -> None:
 @pytest.mark.parametrize(
     ("decimals", "text"),
     [
-        ("1.5707963267948966", "pi/2"),
-        ("-3.141592653589793", "(-pi)"),
-        ("1.3089969389957472", "5*pi/12"),
-        ("1.5708", "Rational(3927, 2500)"),
-        ("0", "0"),
+        ("1.5707963267948966", "pi/2"), ("-3.141592653589793", "(-pi)"), ("1.3089969389957472", "5*pi/12"),
+        ("1.5708", "Rational(3927, 2500)"), ("0", "0"),
     ],
-)
+)  # fmt: skip
 def test_an_angle_is_a_multiple_of_pi_if_its_double_is_the_nearest_one(decimals: str, text: str) -> None:
     assert literal(ExactGraph().angle(Fraction(decimals))) == text
 
@@ -197,11 +186,8 @@ _LEFT_OUT = count(-1, -1)
 #: What sine and cosine may be off by, in halves of an eps.
 SINE = 2.0
 _OPERATIONS: dict[str, Callable[..., Counted]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "neg": operator.neg,
-}
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "neg": operator.neg,
+}  # fmt: skip
 
 
 def of_constant(R: Matrix, S: FloatArray) -> Matrix:
@@ -246,15 +232,13 @@ def joint(x: FloatArray, *, fused: bool) -> Matrix:
 
 
 COUNTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
-    "a constant of which something is left out": (
-        lambda x: of_constant(turn(x, fused=False), partly_zero(x)),
-        1.5,
-    ),
+    "a constant of which something is left out":
+        (lambda x: of_constant(turn(x, fused=False), partly_zero(x)), 1.5),
     "a turn, fused": (lambda x: turned(turn(x, fused=True), float(x[3]), fused=True), 2.5),
     "a turn": (lambda x: turned(turn(x, fused=False), float(x[3]), fused=False), 2.6),
     "a joint, fused": (lambda x: joint(x, fused=True), 6.5),
     "a joint": (lambda x: joint(x, fused=False), 7.2),
-}
+}  # fmt: skip
 
 
 @pytest.mark.long

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import copy
 from typing import Any
 
@@ -17,6 +17,7 @@ import urdfkin
 from scripts.benchmarking.operations import operations
 from tests.export.writing import ALL, code
 from tests.laws.subjects import robot_of, state
+from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export import write
 from urdfkin.export.code import exported
 from urdfkin.export.expression import Graph, Node, needed
@@ -31,13 +32,9 @@ from urdfkin.verify.quantities import ACCELERATION, JACOBIAN
 
 INPUTS = (0.7, -1.3, 2.9)
 _OPERATIONS: dict[str, Callable[..., Any]] = {
-    "+": lambda x, y: x + y,
-    "-": lambda x, y: x - y,
-    "*": lambda x, y: x * y,
-    "neg": lambda x: -x,
-    "sin": math.sin,
-    "cos": math.cos,
-}
+    "+": lambda x, y: x + y, "-": lambda x, y: x - y, "*": lambda x, y: x * y, "neg": lambda x: -x,
+    "sin": math.sin, "cos": math.cos,
+}  # fmt: skip
 
 
 def value(x: Any) -> float:
@@ -56,30 +53,29 @@ def written(draw: st.DrawFn) -> list[tuple[str, int, int]]:
     return [(draw(letters), draw(st.integers(0, 30)), draw(st.integers(0, 30))) for _ in range(12)]
 
 
+def done(steps: list[tuple[str, int, int]], inputs: Iterable[Any]) -> list[Any]:
+    """The results of the operations, on constants and inputs."""
+    numbers = [0.0, 1.0, -1.0, 0.5, *inputs]
+    for op, i, k in steps:
+        x, y = numbers[i % len(numbers)], numbers[k % len(numbers)]
+        numbers.append(-x if op == "n" else _OPERATIONS[op](x, y))
+    return numbers
+
+
 @pytest.mark.slow
 @given(written())
 def test_an_expression_has_the_value_of_its_arithmetic(steps: list[tuple[str, int, int]]) -> None:
     graph = Graph()
-    numbers: list[Any] = [0.0, 1.0, -1.0, 0.5, *(graph.input("q", i) for i in range(3))]
-    plain = [0.0, 1.0, -1.0, 0.5, *INPUTS]
-    for op, i, k in steps:
-        for row in (numbers, plain):
-            x, y = row[i % len(row)], row[k % len(row)]
-            row.append(-x if op == "n" else _OPERATIONS[op](x, y))
+    numbers, plain = (done(steps, three) for three in ((graph.input("q", i) for i in range(3)), INPUTS))
     for found, expected in zip(numbers, plain, strict=True):
-        size = max(map(abs, plain))
-        assert abs(value(found) - expected) <= 1e-13 * size
+        assert abs(value(found) - expected) <= 1e-13 * max(map(abs, plain))
 
 
 @pytest.mark.slow
 @given(written())
 def test_no_operation_is_made_for_nothing(steps: list[tuple[str, int, int]]) -> None:
     graph = Graph()
-    numbers: list[Any] = [0.0, 1.0, -1.0, 0.5, *(graph.input("q", i) for i in range(3))]
-    for op, i, k in steps:
-        x, y = numbers[i % len(numbers)], numbers[k % len(numbers)]
-        numbers.append(-x if op == "n" else _OPERATIONS[op](x, y))
-    for node in needed(numbers):
+    for node in needed(done(steps, (graph.input("q", i) for i in range(3)))):
         constants = [x for x in node.of if not isinstance(x, Node)]
         if node.op in "+-*":
             assert len(constants) < 2
@@ -116,15 +112,9 @@ def test_an_equation_notes_its_numbers_on_what_it_makes_itself_or_through_anothe
 
 
 ODD = (
-    "floating_root",
-    "planar_and_floating_in_the_middle",
-    "two_floating_in_a_row",
-    "mimic_hand_40_sliding",
-    "followers_of_followers",
-    "sizes",
-    "sliding_only",
-    "default_everything",
-)
+    "floating_root", "planar_and_floating_in_the_middle", "two_floating_in_a_row", "mimic_hand_40_sliding",
+    "followers_of_followers", "sizes", "sliding_only", "default_everything",
+)  # fmt: skip
 
 
 @pytest.mark.slow
@@ -157,23 +147,21 @@ def test_an_expression_that_is_wrong_is_never_written(quantity: str, monkeypatch
         code(robot, quantities=(quantity,))
 
 
-def arm() -> Robot:
-    return urdfkin.load("panda", verify=False)
+def plan_of(robot: Robot) -> CompiledTree:
+    return robot.plan([robot.tree.frame_link(robot.tip_frame)])
 
 
 def test_each_joints_sine_and_cosine_stand_there_once_and_no_more_than_are_needed() -> None:
-    robot = arm()
-    plan = robot.plan([robot.tree.frame_link("panda_hand")])
-    place, jacobian = (
-        function_of(plan, row, Reference.LOCAL_WORLD_ALIGNED) for row in (exported()[0], JACOBIAN)
-    )
+    robot = urdfkin.load("panda", verify=False)
+    plan, aligned = robot.plan([robot.tree.frame_link("panda_hand")]), Reference.LOCAL_WORLD_ALIGNED
+    place, jacobian = (function_of(plan, row, aligned) for row in (exported()[0], JACOBIAN))
     assert sum(node.op == "sin" for node in place.nodes) == 7
     assert sum(node.op == "cos" for node in place.nodes) == 7
     assert len(jacobian.angles) == 6, "how the last joint turns moves no axis"
 
 
 def test_it_takes_fewer_operations_than_the_walk_for_any_robot() -> None:
-    robot = arm()
+    robot = urdfkin.load("panda", verify=False)
     plan = robot.plan([robot.tree.frame_link("panda_hand")])
     for row in (JACOBIAN, ACCELERATION):
         function = function_of(plan, row, Reference.LOCAL_WORLD_ALIGNED)
@@ -184,8 +172,7 @@ def test_it_takes_fewer_operations_than_the_walk_for_any_robot() -> None:
 
 
 def test_statements_are_in_an_order_in_which_they_can_be_computed() -> None:
-    robot = robot_of("planar_and_floating_in_the_middle")
-    plan = robot.plan([robot.tree.frame_link(robot.tip_frame)])
+    plan = plan_of(robot_of("planar_and_floating_in_the_middle"))
     function = function_of(plan, ACCELERATION, Reference.LOCAL)
     done = set[Node]()
     for node in function.nodes:
@@ -195,9 +182,7 @@ def test_statements_are_in_an_order_in_which_they_can_be_computed() -> None:
 
 
 def test_a_robot_with_huge_and_tiny_links_keeps_its_tiny_ones() -> None:
-    robot = robot_of("sizes")
-    plan = robot.plan([robot.tree.frame_link(robot.tip_frame)])
-    function = function_of(plan, exported()[0], Reference.LOCAL)
+    function = function_of(plan_of(robot_of("sizes")), exported()[0], Reference.LOCAL)
     lengths = {x for node in function.nodes for x in node.of if isinstance(x, float)}
     assert any(0.0 < x < 1e-5 for x in lengths)
     assert any(x > 100.0 for x in lengths)
@@ -225,25 +210,21 @@ def test_a_documents_formulas_compute_what_the_robot_does() -> None:
     robot = urdfkin.load("ur5")
     document = write(code(robot, "tool0", ALL), "latex")
     q, v, a = (x[0] for x in state(robot, 1, 4))
-    given = {
-        f"{letter}_{{{k + 1}}}": float(number)
-        for letter, numbers in (("q", q), ("v", v), ("a", a))
-        for k, number in enumerate(numbers)
-    }
+    inputs = (
+        (letter, k, x) for letter, row in zip("qva", (q, v, a), strict=True) for k, x in enumerate(row, 1)
+    )
+    given = {f"{letter}_{{{k}}}": float(x) for letter, k, x in inputs}
     sections = document.split(r"\subsection*")[1:]
     assert len(sections) == len(ALL)
-    expected = {
-        "T": robot.placement(q, "tool0"),
-        "J": robot.jacobian(q, "tool0"),
-        r"\dot{J}": robot.jacobian_rate(q, v, "tool0"),
-    }
     found = [evaluated(section, dict(given)) for section in sections]
-    for letter, matrix in expected.items():
+    for letter, matrix in (
+        ("T", robot.placement(q, "tool0")),
+        ("J", robot.jacobian(q, "tool0")),
+        (r"\dot{J}", robot.jacobian_rate(q, v, "tool0")),
+    ):
         (own,) = (x for x in found if f"{letter}_{{1,1}}" in x)
-        numbers = [
-            [own[f"{letter}_{{{i + 1},{k + 1}}}"] for k in range(matrix.shape[1])] for i in range(len(matrix))
-        ]
-        assert np.abs(np.array(numbers) - matrix).max() < 1e-12
+        for (i, k), expected in np.ndenumerate(matrix):
+            assert abs(own[f"{letter}_{{{i + 1},{k + 1}}}"] - expected) < 1e-12
 
 
 def test_braces_and_environments_of_a_document_are_closed() -> None:

@@ -66,18 +66,12 @@ def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None
 @pytest.mark.parametrize(
     ("number", "text"),
     [
-        (0, "0.0"),
-        (1, "1.0"),
-        (-0.375, "-0.375"),
-        ("0.1", "0.1"),
-        ("1e70", "1.0e+70"),
+        (0, "0.0"), (1, "1.0"), (-0.375, "-0.375"), ("0.1", "0.1"), ("1e70", "1.0e+70"),
         ("-2.5e-7", "-2.5e-7"),
         ("0.6666666666666666666666666666666666666666666666666666666", f"0.{'6' * 49}7"),
     ],
-)
-def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_the_end(
-    number: str | float, text: str
-) -> None:
+)  # fmt: skip
+def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_its_end(number: Any, text: str) -> None:
     with precision(90):
         ball = arb(number)
         assert decimal(ball) == text
@@ -120,9 +114,7 @@ def test_a_small_robots_file_does_so_in_every_reference(to: str, tmp_path: Path)
         ("gcc", ["-std=c11", "-O3", "-march=native", "-ffp-contract=fast"]),
     ],
 )
-def test_c_compiles_without_a_warning_wherever_eight_numbers_are_one(
-    compiler: str, options: list[str], tmp_path: Path
-) -> None:
+def test_c_compiles_without_warning_if_eight_are_one(compiler: str, options: Any, tmp_path: Path) -> None:
     written = code(robot_of("mimic_hand_40_sliding"), quantities=("jacobian", "acceleration"))
     path, name = file(written, "c", tmp_path), written.name.upper()
     for more in ([], [f"-D{name}_PORTABLE"], [f"-D{name}_REAL=float"]):
@@ -143,18 +135,14 @@ def test_c_touches_nothing_that_is_not_its_own(tmp_path: Path) -> None:
     ("to", "compiler"),
     [("c", "gcc"), ("c", "clang"), *((to, x) for to in ("cpp", "cuda") for x in ("g++", "clang++"))],
 )
-def test_an_option_that_lets_a_compiler_reorder_sums_is_refused(
-    to: str, compiler: str, tmp_path: Path
-) -> None:
+def test_options_that_let_compilers_reorder_sums_are_refused(to: str, compiler: str, tmp_path: Path) -> None:
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler}")
     path = file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), to, tmp_path)
     command = [compiler, "-x", "c" if to == "c" else "c++", "-fsyntax-only", str(path)]
     assert subprocess.run(command, check=False).returncode == 0
-    parts = (
-        [[], ["-fno-finite-math-only"]] if compiler in ("gcc", "g++") else [[]]
-    )  # Clang has one macro only
-    for rest in parts:
+    # Clang has one macro only.
+    for rest in [[], ["-fno-finite-math-only"]] if compiler in ("gcc", "g++") else [[]]:
         done = subprocess.run([*command, "-ffast-math", *rest], capture_output=True, text=True, check=False)
         assert done.returncode != 0
         assert "-ffast-math" in done.stderr
@@ -177,9 +165,7 @@ def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["numpy", "array", "torch", "sympy-exact"])
-def test_every_constant_of_a_function_is_noticed_if_it_is_changed_by_a_billionth(
-    to: str, tmp_path: Path
-) -> None:
+def test_every_constant_of_a_function_is_noticed_if_changed_by_a_billionth(to: str, tmp_path: Path) -> None:
     need(to)
     text = file(code(robot_of("panda"), quantities=_THREE), to, tmp_path).read_text("utf-8")
     functions = [x for x in ast.parse(text).body if isinstance(x, ast.FunctionDef) and x.name in _THREE]
@@ -189,10 +175,9 @@ def test_every_constant_of_a_function_is_noticed_if_it_is_changed_by_a_billionth
         if fraction == (to == "sympy-exact") and (fraction or isinstance(getattr(node, "value", 0), float)):
             assert isinstance(node, ast.expr)
             row, first, last = node.lineno - 1, node.col_offset, node.end_col_offset
-            line = lines[row]
-            other = f"({line[first:last]} + 1e-9)"
-            scope: dict[str, Any] = {"__name__": "changed"}
-            exec("".join([*lines[:row], line[:first] + other + line[last:], *lines[row + 1 :]]), scope)
+            line, scope = lines[row], dict[str, Any](__name__="changed")
+            other = f"{line[:first]}({line[first:last]} + 1e-9){line[last:]}"
+            exec("".join([*lines[:row], other, *lines[row + 1 :]]), scope)
             assert max(scope["check"]().values()) > 1.0, line
             changed += 1
     assert changed > 20
@@ -211,9 +196,8 @@ def test_a_frame_that_nothing_moves_has_code_too(to: str, tmp_path: Path) -> Non
 @pytest.mark.slow
 def test_a_file_can_say_so_without_urdfkin(tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "numpy", tmp_path)
-    assert "urdfkin" not in "".join(
-        re.findall(r"^(?:from|import) .*$", path.read_text("utf-8"), re.MULTILINE)
-    )
+    imports = re.findall(r"^(?:from|import) .*$", path.read_text("utf-8"), re.MULTILINE)
+    assert "urdfkin" not in "".join(imports)
     done = ran(path)
     assert done.returncode == 0
     assert done.stdout.startswith("good jacobian: 4 test vectors")
@@ -225,11 +209,9 @@ def test_numpys_functions_take_any_batch(tmp_path: Path) -> None:
     q, v, a = state(robot, 6, 1)
     q = q.reshape(2, 3, -1)
     assert own.jacobian(q).shape == (2, 3, 6, robot.nv)
-    assert own.acceleration(q, v[0], a[0]).shape == (2, 3, 6)
-    frame = robot.tip_frame
-    assert np.allclose(
-        own.acceleration(q, v[0], a[0]), robot.acceleration(q, v[0], a[0], frame), rtol=0, atol=1e-12
-    )
+    found, right = own.acceleration(q, v[0], a[0]), robot.acceleration(q, v[0], a[0], robot.tip_frame)
+    assert found.shape == (2, 3, 6)
+    assert np.allclose(found, right, rtol=0, atol=1e-12)
 
 
 #: Namespaces of the array API in which exported code runs here.
@@ -297,14 +279,10 @@ def test_numpys_functions_refuse_a_wrong_length_and_convert_whole_numbers(tmp_pa
 @pytest.mark.parametrize(
     ("wrong", "found"),
     [
-        ([1j, 0.0], "complex128"),
-        (["1", "2"], "<U1"),
-        ("ab", "<U2"),
-        ([None, 0.0], "object"),
-        ({"q": 1.0}, "object"),
-        (np.array(["2026-11-24"] * 2, dtype="datetime64[D]"), r"datetime64\[D\]"),
+        ([1j, 0.0], "complex128"), (["1", "2"], "<U1"), ("ab", "<U2"), ([None, 0.0], "object"),
+        ({"q": 1.0}, "object"), (np.array(["2026-11-24"] * 2, dtype="datetime64[D]"), r"datetime64\[D\]"),
     ],
-)
+)  # fmt: skip
 def test_numpys_functions_refuse_numbers_that_are_not_real(wrong: Any, found: str, tmp_path: Path) -> None:
     own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numpy", tmp_path))
     with pytest.raises(TypeError, match=rf"q needs real numbers: found {found}$"):
@@ -339,9 +317,8 @@ def test_functions_of_any_array_refuse_what_is_no_array(
     own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "array", tmp_path))
     right = np.zeros(2)
     for wrong, found in (([0.0, 0.0], "list"), ("ab", "str"), (None, "NoneType")):
-        with pytest.raises(
-            TypeError, match=rf"q needs an array of an array API .*: found builtins\.{found}\."
-        ):
+        words = rf"q needs an array of an array API .*: found builtins\.{found}\."
+        with pytest.raises(TypeError, match=words):
             own.velocity(wrong, right)
         with pytest.raises(TypeError, match=f"v needs an array: found {found}$"):
             own.velocity(right, wrong)
@@ -349,16 +326,12 @@ def test_functions_of_any_array_refuse_what_is_no_array(
 
 def test_functions_of_casadi_refuse_a_wrong_length(tmp_path: Path) -> None:
     casadi: Any = pytest.importorskip("casadi")
-    written = file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "casadi", tmp_path)
-    own = module_of(written)
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "casadi", tmp_path))
     for kind in (casadi.SX, casadi.MX):
         for right in (kind.sym("q", 2), kind.sym("q", 1, 2), [0.0, kind.sym("q")], np.zeros(2)):
             assert own.velocity(right, [0.0, 1.0]).shape == (6, 1)
-        for wrong, found in (
-            (kind.sym("q", 3), r"\(3, 1\)"),
-            (kind.sym("q", 2, 2), r"\(2, 2\)"),
-            ([0.0], r"\(1,\)"),
-        ):
+        three, four = kind.sym("q", 3), kind.sym("q", 2, 2)
+        for wrong, found in ((three, r"\(3, 1\)"), (four, r"\(2, 2\)"), ([0.0], r"\(1,\)")):
             with pytest.raises(ValueError, match=f"q needs 2 numbers: found the shape {found}"):
                 own.velocity(wrong, [0.0, 1.0])
             with pytest.raises(ValueError, match=f"v needs 2 numbers: found the shape {found}"):
@@ -386,17 +359,13 @@ def test_functions_of_matlab_refuse_a_wrong_length(tmp_path: Path) -> None:
     lines = [f"try, disp(size(f.velocity({x}))), catch e, disp(e.message), end" for x in calls]
     command = ["octave-cli", "--no-init-file", "--eval", f"f = {path.stem}(); {'; '.join(lines)}"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
-    assert [line.split() for line in done.stdout.splitlines()] == [
-        ["q", "needs", "2", "numbers:", "found", "3"],
-        ["v", "needs", "2", "numbers:", "found", "1"],
-        ["6", "1"],
-    ]
+    said = [" ".join(line.split()) for line in done.stdout.splitlines()]
+    assert said == ["q needs 2 numbers: found 3", "v needs 2 numbers: found 1", "6 1"]
 
 
 @pytest.mark.slow
 def test_numbas_functions_refuse_a_wrong_length(tmp_path: Path) -> None:
-    written = file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numba", tmp_path)
-    own = module_of(written)
+    own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("velocity",)), "numba", tmp_path))
     q = np.zeros(3)
     for wrong in (q, q[:1]):
         with pytest.raises(ValueError, match="q needs 2 numbers"):
@@ -408,9 +377,8 @@ def test_numbas_functions_refuse_a_wrong_length(tmp_path: Path) -> None:
 
 def test_a_namespace_that_makes_float32_of_float64_is_an_error_of_the_check(tmp_path: Path) -> None:
     own = module_of(file(code(urdfkin.load("planar_two_link"), quantities=("placement",)), "array", tmp_path))
-    narrow = SimpleNamespace(
-        asarray=lambda x, dtype: np.asarray(x, dtype=np.float32), float64=np.float64, float32=np.float32
-    )
+    narrow = SimpleNamespace(float64=np.float64, float32=np.float32)
+    narrow.asarray = lambda x, dtype: np.asarray(x, dtype=np.float32)
     with pytest.raises(TypeError, match=r"makes float32 of float64.*jax_enable_x64"):
         own.check(narrow)
 
@@ -448,9 +416,7 @@ def test_the_tolerance_of_difference_quotients_includes_their_truncation(
     robot = urdfkin.load(_GEARED.format(multiplier))
     written = code(robot, "d", ("placement", "jacobian"))
     slopes = {
-        "placement": lambda q: np.concatenate(
-            (robot.jacobian(q, "d")[..., :3, 0], np.zeros((1, 1))), axis=-1
-        ),
+        "placement": lambda q: np.hstack((robot.jacobian(q, "d")[..., :3, 0], np.zeros((1, 1)))),
         "jacobian": lambda q: robot.hessian(q, "d")[..., 0],
     }
     seen = []
@@ -548,9 +514,8 @@ def test_a_module_of_pytorch_has_the_quantities_and_their_derivatives() -> None:
 def test_pytorch_that_is_not_installed_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
     found = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else found(name))
-    with pytest.raises(
-        InputError, match=r"robot\.torch needs PyTorch: found no module torch; pip install torch"
-    ):
+    words = r"robot\.torch needs PyTorch: found no module torch; pip install torch"
+    with pytest.raises(InputError, match=words):
         urdfkin.load("planar_two_link").torch("tip")
 
 
@@ -575,14 +540,11 @@ def test_jax_differentiates_maps_and_compiles_it(tmp_path: Path) -> None:
     own = module_of(file(code(robot, quantities=("placement", "jacobian", "velocity")), "jax", tmp_path))
     q, v, _ = state(robot, 5, 2)
     Js = np.asarray(jax.vmap(jax.jit(own.jacobian))(q))
-    slopes = jax.vmap(jax.jacfwd(lambda x: own.placement(x)[:3, 3]))(q)
-    assert np.abs(np.asarray(slopes) - Js[:, :3]).max() < 1e-13
-    backwards = jax.vmap(jax.jacrev(lambda x: own.placement(x)[:3, 3]))(q)
-    assert np.abs(np.asarray(backwards) - Js[:, :3]).max() < 1e-13
-    pushed = jax.vmap(lambda x, y: jax.jvp(own.placement, (x,), (y,))[1])(q, v)
-    assert (
-        np.abs(np.asarray(pushed)[:, :3, 3] - np.asarray(jax.vmap(own.velocity)(q, v))[:, :3]).max() < 1e-12
-    )
+    for differentiated in (jax.jacfwd, jax.jacrev):
+        slopes = jax.vmap(differentiated(lambda x: own.placement(x)[:3, 3]))(q)
+        assert np.abs(np.asarray(slopes) - Js[:, :3]).max() < 1e-13
+    pushed = np.asarray(jax.vmap(lambda x, y: jax.jvp(own.placement, (x,), (y,))[1])(q, v))
+    assert np.abs(pushed[:, :3, 3] - np.asarray(jax.vmap(own.velocity)(q, v))[:, :3]).max() < 1e-12
 
 
 @pytest.mark.slow
@@ -617,16 +579,16 @@ def test_what_is_not_a_file_of_ours_is_refused(tmp_path: Path) -> None:
 
 def test_what_cannot_be_exported_is_refused_with_what_can() -> None:
     robot = urdfkin.load("planar_two_link")
-    with pytest.raises(UnknownNameError, match="language"):
-        robot.export("fortran")
-    with pytest.raises(UnknownNameError, match="frame"):
-        robot.export("c", "nowhere")
-    with pytest.raises(UnknownNameError, match="quantity"):
-        robot.export("c", quantities=["placment"])
-    with pytest.raises(InputError, match="choose among placement, velocity"):
-        robot.export("c", quantities=["screws"])
-    with pytest.raises(InputError, match="no quantity"):
-        robot.export("c", quantities=[])
+    asked: tuple[tuple[tuple[Any, ...], type[Exception], str], ...] = (
+        (("fortran",), UnknownNameError, "language"),
+        (("c", "nowhere"), UnknownNameError, "frame"),
+        (("c", None, ["placment"]), UnknownNameError, "quantity"),
+        (("c", None, ["screws"]), InputError, "choose among placement, velocity"),
+        (("c", None, []), InputError, "no quantity"),
+    )
+    for words, error, said in asked:
+        with pytest.raises(error, match=said):
+            robot.export(*words)
     with pytest.raises(InputError, match="the Jacobian has no columns"):
         robot_of("single_link").export("c")
     assert "double" in robot_of("single_link").export("c", quantities=["placement"])
@@ -635,9 +597,7 @@ def test_what_cannot_be_exported_is_refused_with_what_can() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["numpy", "c", "casadi", "matlab"])
 @pytest.mark.parametrize("form", ["dh", "screws"])
-def test_a_table_and_screws_are_code_in_every_language_with_its_check(
-    form: str, to: str, tmp_path: Path
-) -> None:
+def test_a_table_and_screws_are_code_in_each_language_and_checked(form: str, to: str, tmp_path: Path) -> None:
     need(to)
     path = tmp_path / f"arm{LANGUAGES[to][1]}"
     path.write_text(urdfkin.load("ur5").export(to, "tool0", form=form), encoding="utf-8")
@@ -677,17 +637,15 @@ def test_a_changed_constant_in_the_code_of_a_table_is_noticed(tmp_path: Path) ->
     assert not found.verified
 
 
-@pytest.mark.parametrize(
-    ("to", "right", "wrong"),
-    [
-        ("numpy", "out[..., 0, 0] = R6_00", 'out[..., 0, 0] = float("nan") * R6_00'),
-        ("c", "out[0 * L] = R6_00;", "out[0 * L] = R6_00 * (R(0.0) / R(0.0));"),
-    ],
-)
-def test_a_result_that_is_nan_is_noticed_although_right_ones_follow(
-    to: str, right: str, wrong: str, tmp_path: Path
-) -> None:
-    text = urdfkin.load("ur5").export(to, "tool0", ["placement"])
+NAN = {
+    "numpy": ("out[..., 0, 0] = R6_00", 'out[..., 0, 0] = float("nan") * R6_00'),
+    "c": ("out[0 * L] = R6_00;", "out[0 * L] = R6_00 * (R(0.0) / R(0.0));"),
+}
+
+
+@pytest.mark.parametrize("to", NAN)
+def test_a_result_that_is_nan_is_noticed_although_right_ones_follow(to: str, tmp_path: Path) -> None:
+    text, (right, wrong) = urdfkin.load("ur5").export(to, "tool0", ["placement"]), NAN[to]
     assert right in text
     path = tmp_path / f"arm.{'py' if to == 'numpy' else to}"
     path.write_text(text.replace(right, wrong), encoding="utf-8")

@@ -89,14 +89,10 @@ def worst(made: Made, scale: float = 1.0) -> float:
 
 #: An expression whose only error is that of one operation. 0.75 is a number of single precision.
 OPERATIONS: dict[str, Made] = {
-    "+": lambda g, x, y, z: x + y,
-    "-": lambda g, x, y, z: x - z,
-    "*": lambda g, x, y, z: x * y,
-    "/": lambda g, x, y, z: x / y,
-    "sqrt": lambda g, x, y, z: g.root(x),
-    "sin": lambda g, x, y, z: g.sine_cosine(x)[0],
-    "cos": lambda g, x, y, z: g.sine_cosine(x)[1],
-}
+    "+": lambda g, x, y, z: x + y, "-": lambda g, x, y, z: x - z, "*": lambda g, x, y, z: x * y,
+    "/": lambda g, x, y, z: x / y, "sqrt": lambda g, x, y, z: g.root(x),
+    "sin": lambda g, x, y, z: g.sine_cosine(x)[0], "cos": lambda g, x, y, z: g.sine_cosine(x)[1],
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("op", OPERATIONS)
@@ -186,9 +182,7 @@ def test_a_file_needs_the_rounding_of_its_constants(tmp_path: Path, monkeypatch:
     assert shares(text, tmp_path)["placement", "float64"] <= 1.0
 
 
-def test_a_file_needs_the_errors_of_its_double_constants(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_needs_errors_of_its_double_constants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = _FIXED.format("0 0 0", "1.5707963267948966 0 0")  # its cosine, 6e-17, is 0 in the code
     assert shares(text, tmp_path)["placement", "float32"] <= 1.0
     monkeypatch.setattr(proof, "EPS", 0.0)
@@ -201,13 +195,11 @@ def shares_of(robot: urdfkin.Robot, quantities: tuple[str, ...], folder: Path, f
     return max(float(share) for (_, kind), share in own.check().items() if kind == "float64")
 
 
+_RULE = mimic("j", "{multiplier}", "{offset}") + limit(-1e9, 1e9)
 _TURNED = urdfs.robot(
     joint("j", "revolute", "a", "b", 'rpy="{angle} {angle} 0.1"', more=limit(-2, 2)),
-    joint(
-        "k", "revolute", "b", "c", 'xyz="1 0 0"', "0 1 0",
-        mimic("j", "{multiplier}", "{offset}") + limit(-1e9, 1e9),
-    ),
-)  # fmt: skip
+    joint("k", "revolute", "b", "c", 'xyz="1 0 0"', "0 1 0", _RULE),
+)
 
 
 @pytest.mark.parametrize("seed", range(1, 4))
@@ -262,9 +254,8 @@ def test_a_bound_is_written_rounded_down_and_by_less_than_ten_millionths(x: floa
 
 def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp_path: Path) -> None:
     text = code(urdfkin.load("ur5"), quantities=("placement", "jacobian")).head
-    assert (
-        "Bounds in single precision, in eps*scale with eps = 2^-23, the constants' rounding included:" in text
-    )
+    words = "in eps*scale with eps = 2^-23, the constants' rounding included:"
+    assert f"Bounds in single precision, {words}" in text
     (line,) = (x for x in text if x.startswith("  placement ") and ", jacobian " in x)
     assert 1.0 < float(line.split()[1].rstrip(",")) < 24.0 * 7
     large = _FIXED.format("1e39 0 0", "0 0 0")
@@ -280,9 +271,7 @@ def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp
 @pytest.mark.parametrize(
     "name", ["panda", "sizes", "mimic_hand_40_sliding", "planar_and_floating_in_the_middle", "floating_root"]
 )
-def test_the_bound_holds_in_many_configurations_and_is_not_much_larger_than_the_error(
-    name: str, tmp_path: Path
-) -> None:
+def test_the_bound_holds_in_many_configurations_and_is_not_much_larger(name: str, tmp_path: Path) -> None:
     robot = robot_of(name)
     written = code(robot, quantities=("placement", "jacobian", "jacobian_rate", "acceleration"))
     own = module_of(file(written, "array", tmp_path))

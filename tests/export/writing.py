@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,11 +23,11 @@ PROGRAMS = {"c": "cc", "cpp": "c++", "cuda": "c++", "matlab": "octave-cli"}
 LIBRARIES = ("numba", "jax", "torch", "casadi", "sympy", "sympy-exact")
 
 
+_ALIGNED = Reference.LOCAL_WORLD_ALIGNED
+
+
 def code(
-    robot: Robot,
-    frame: str | None = None,
-    quantities: tuple[str, ...] = ALL,
-    reference: Reference = Reference.LOCAL_WORLD_ALIGNED,
+    robot: Robot, frame: str | None = None, quantities: tuple[str, ...] = ALL, reference: Reference = _ALIGNED
 ) -> Code:
     """What is written about a frame."""
     frame = frame or robot.tip_frame
@@ -57,13 +58,10 @@ def built(path: Path, compiler: str, *options: str) -> str:
     program = path.with_suffix(".out")
     command = [compiler, *strict, f"-D{name}_MAIN", *options, str(path), "-o", str(program), "-lm"]
     subprocess.run(command, check=True)
-    done = subprocess.run([str(program)], capture_output=True, text=True, check=False)
-    return done.stdout
+    return subprocess.run([str(program)], capture_output=True, text=True, check=False).stdout
 
 
 def ran(path: Path) -> subprocess.CompletedProcess[str]:
     """A Python file as a program."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    return subprocess.run(
-        [sys.executable, str(path)], capture_output=True, text=True, check=False, env=environment
-    )
+    how: dict[str, Any] = {"env": {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}, "text": True}
+    return subprocess.run([sys.executable, str(path)], capture_output=True, check=False, **how)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -9,13 +10,14 @@ import pytest
 from hypothesis import given, settings
 
 import urdfkin
+from tests import urdfs
 from tests.oracle import TreeOracle
-from tests.random_chains import configurations, rotation, shift, trees
+from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.model.chain import chain
 from urdfkin.model.path import Motion, Path, elementary
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Mimic, build_tree, pose
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, build_tree, pose
 from urdfkin.verify.chain_checks import check_chain
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import PinocchioOracle
@@ -24,33 +26,20 @@ from urdfkin.verify.tables import TableError
 EPS = np.finfo(np.float64).eps
 
 
-def joint(
-    name: str, T: FloatArray | None = None, kind: JointKind = JointKind.REVOLUTE, mimic: Mimic | None = None
-) -> Joint:
-    pose = np.eye(4) if T is None else T
-    return Joint(name, kind, 0, pose, np.array([0.0, 0.0, 1.0]), mimic=mimic)
-
-
 @pytest.fixture
 def walker() -> KinematicTree:
     """Two legs and a platform that floats, joined at the pelvis."""
     hip = shift(0.0, 0.1, 0.0) @ rotation("x", 0.3)
-    return build_tree(
-        "walker",
-        "pelvis",
-        [
-            (joint("left_hip", hip), "pelvis", "left_thigh"),
-            (joint("left_knee", shift(0.4, 0.0, 0.0)), "left_thigh", "left_shin"),
-            (joint("left_sole", shift(0.0, 0.0, -0.5), JointKind.FIXED), "left_shin", "left_foot"),
-            (joint("right_hip", hip.T), "pelvis", "right_thigh"),
-            (
-                joint("right_knee", shift(0.4, 0, 0), mimic=Mimic("left_knee", -1.5, 0.2)),
-                "right_thigh",
-                "right_shin",
-            ),
-            (joint("float", kind=JointKind.FLOATING), "left_shin", "balloon"),
-        ],
-    )
+    knee = z_joint("right_knee", shift(0.4, 0, 0), mimic=Mimic("left_knee", -1.5, 0.2))
+    rows = [
+        (z_joint("left_hip", hip), "pelvis", "left_thigh"),
+        (z_joint("left_knee", shift(0.4, 0.0, 0.0)), "left_thigh", "left_shin"),
+        (z_joint("left_sole", shift(0.0, 0.0, -0.5), JointKind.FIXED), "left_shin", "left_foot"),
+        (z_joint("right_hip", hip.T), "pelvis", "right_thigh"),
+        (knee, "right_thigh", "right_shin"),
+        (z_joint("float", kind=JointKind.FLOATING), "left_shin", "balloon"),
+    ]
+    return build_tree("walker", "pelvis", rows)
 
 
 @pytest.mark.slow
@@ -60,13 +49,12 @@ def test_every_path_of_a_tree_is_placed_as_pinocchio_places_it(tree: KinematicTr
     oracle = TreeOracle(tree)
     q = configurations(tree.nq, 4)
     ends = [tree.links[0], tree.links[-1], tree.links[len(tree.links) // 2]]
-    for base in ends:
-        for tip in ends:
-            path = chain(tree, tip, base)
-            own = path.coupling.select(tree, q)
-            scale = 1.0 + path.lengths.sum() + 10.0 * len(path.joints)
-            error = np.abs(path.placement(own) - oracle.placement(q, tip, base)).max()
-            assert error <= 10 * (1 + len(tree.joints)) * EPS * scale
+    for base, tip in itertools.product(ends, ends):
+        path = chain(tree, tip, base)
+        scale = 1.0 + path.lengths.sum() + 10.0 * len(path.joints)
+        found = path.placement(path.coupling.select(tree, q))
+        error = np.abs(found - oracle.placement(q, tip, base)).max()
+        assert error <= 10 * (1 + len(tree.joints)) * EPS * scale
 
 
 def test_a_path_through_the_common_ancestor_goes_up_and_then_down(walker: KinematicTree) -> None:
@@ -79,8 +67,7 @@ def test_a_joint_passed_backwards_has_its_axis_reversed_and_keeps_its_sign(walke
     there, back = chain(walker, "left_shin", "left_thigh"), chain(walker, "left_thigh", "left_shin")
     np.testing.assert_array_equal(there.axes(), [[0.0, 0.0, 1.0]])
     np.testing.assert_array_equal(back.axes(), [[0.0, 0.0, -1.0]])
-    product = there.placement([0.7]) @ back.placement([0.7])
-    np.testing.assert_allclose(product, np.eye(4), atol=4 * EPS)
+    np.testing.assert_allclose(there.placement([0.7]) @ back.placement([0.7]), np.eye(4), atol=4 * EPS)
 
 
 @pytest.mark.slow
@@ -89,10 +76,9 @@ def test_a_joint_passed_backwards_has_its_axis_reversed_and_keeps_its_sign(walke
 def test_a_chain_and_its_reverse_undo_each_other(tree: KinematicTree) -> None:
     there, back = chain(tree, "tip", "l0"), chain(tree, "l0", "tip")
     q = configurations(tree.nq, 4)
-    q_there, q_back = there.coupling.select(tree, q), back.coupling.select(tree, q)
+    T_there, T_back = (path.placement(path.coupling.select(tree, q)) for path in (there, back))
     scale = 1.0 + there.lengths.sum() + 10.0 * len(there.joints)
-    error = np.abs(there.placement(q_there) @ back.placement(q_back) - np.eye(4)).max()
-    assert error <= 20 * (1 + len(tree.joints)) * EPS * scale
+    assert np.abs(T_there @ T_back - np.eye(4)).max() <= 20 * (1 + len(tree.joints)) * EPS * scale
 
 
 def test_a_followers_leader_is_a_coordinate_wherever_it_stands(walker: KinematicTree) -> None:
@@ -100,17 +86,15 @@ def test_a_followers_leader_is_a_coordinate_wherever_it_stands(walker: Kinematic
     assert path.joint_names == ("right_hip", "left_knee")
     assert path.coupling.values([0.1, 2.0]).tolist() == [0.1, -1.5 * 2.0 + 0.2]
     q = np.arange(1.0, walker.nq + 1)
-    names = [j.name for j in walker.joints if j.nq == 1]
     picked = dict(zip(path.joint_names, path.coupling.select(walker, q), strict=True))
     assert picked["left_knee"] == q[walker.q_index[walker.joint_index("left_knee")]]
-    assert set(picked) <= set(names)
+    assert set(picked) <= {j.name for j in walker.joints if j.nq == 1}
 
 
 def test_coordinates_can_be_given_by_name(walker: KinematicTree) -> None:
     path = chain(walker, "left_foot")
-    np.testing.assert_array_equal(
-        path.placement({"left_knee": 0.4, "left_hip": 0.1}), path.placement([0.1, 0.4])
-    )
+    named = path.placement({"left_knee": 0.4, "left_hip": 0.1})
+    np.testing.assert_array_equal(named, path.placement([0.1, 0.4]))
     np.testing.assert_array_equal(path.placement("neutral, left_knee=0.4"), path.placement([0.0, 0.4]))
     with pytest.raises(UnknownNameError, match="left_knee"):
         path.placement({"left_nee": 0.4})
@@ -180,14 +164,12 @@ def moved(name: str, T: FloatArray) -> Callable[..., FloatArray]:
 def test_an_origin_or_a_direction_off_by_itself_is_a_disagreement(
     frame: str, T: FloatArray, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot = urdfkin.load(
-        """<robot name="r"><link name="base"/><link name="upper"/><link name="fore"/><link name="tool"/>
-    <joint name="arm" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/></joint>
-    <joint name="forearm" type="continuous"><parent link="upper"/><child link="fore"/>
-    <origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
-    <joint name="mount" type="fixed"><parent link="fore"/><child link="tool"/><origin xyz="1 0 0"/></joint>
-        </robot>"""
+    text = urdfs.robot(
+        urdfs.joint("arm", "continuous", "base", "upper"),
+        urdfs.joint("forearm", "continuous", "upper", "fore", 'xyz="1 0 0"'),
+        urdfs.joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', ""),
     )
+    robot = urdfkin.load(text)
     path, q = robot.chain("tool"), np.zeros((1, 2))
     assert check_chain(robot.verifier, path, q) is not None
     monkeypatch.setattr(PinocchioOracle, "placements", moved(frame, T))

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
 from tests.cli.running import urdfkin as command
+from tests.urdfs import joint, limit
 from urdfkin.calibration.calibrate import ImplausibleError
 from urdfkin.model.configuration import degrees_lines
-from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.trajectory import line
 
@@ -81,11 +82,8 @@ def test_plausible_angles_and_nonsense_cause_no_warning(ur5: Robot, q: Any) -> N
 
 
 def test_lengths_and_joints_without_limits_cause_no_warning() -> None:
-    text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-    <joint name="wheel" type="continuous"><parent link="a"/><child link="b"/></joint>
-    <joint name="rail" type="prismatic"><parent link="b"/><child link="c"/>
-    <limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
-    robot = urdfkin.load(text)
+    joints = joint("wheel", "continuous", "a", "b"), joint("rail", "prismatic", "b", "c", more=limit(0, 1))
+    robot = urdfkin.load(urdfs.robot(*joints))
     assert robot.tree.least_implausible == math.inf
     robot.placement([300.0, 30.0])
 
@@ -105,20 +103,17 @@ def test_all_configurations_of_a_batch_in_degrees_need_only_some_looks(ur5: Robo
 
 
 def test_a_batch_in_radians_is_not_copied_and_hardly_read(ur5: Robot) -> None:
-    tree, q = ur5.tree, ur5.sample(200_000)
-    assert isinstance(tree, KinematicTree)
-    assert degrees_lines(tree, q) == []
-    assert degrees_lines(tree, q[::2, ::-1]) == []
+    q = ur5.sample(200_000)
+    assert degrees_lines(ur5.tree, q) == []
+    assert degrees_lines(ur5.tree, q[::2, ::-1]) == []
 
 
 # -- commands, calibration ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "words", [("placement", "--q"), ("imu", "--q"), ("singular-values", "--q"), ("hessian", "--q")]
-)
-def test_a_command_prints_one_line_about_degrees(words: tuple[str, str]) -> None:
-    done = command(words[0], "ur5", words[1], "neutral,elbow_joint=90")
+@pytest.mark.parametrize("name", ["placement", "imu", "singular-values", "hessian"])
+def test_a_command_prints_one_line_about_degrees(name: str) -> None:
+    done = command(name, "ur5", "--q", "neutral,elbow_joint=90")
     assert done.err.count("degrees?") == 1
     assert "warning: joint elbow_joint: 90 is outside" in done.err
     assert "DegreesWarning" not in done.err

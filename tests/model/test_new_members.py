@@ -17,7 +17,7 @@ from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.compiled.breakdown import acceleration_breakdown
 from urdfkin.compiled.machine.single import single
 from urdfkin.compiled.plan import REFERENCES as IN_KERNELS
-from urdfkin.compiled.plan import compile_tree
+from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.export.function import function_of
 from urdfkin.export.recursion import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies import QUATERNION
@@ -26,7 +26,7 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.mechanisms.mechanism import coordinates_of, pose_of
 from urdfkin.model.recursion import IDENTITY, ZERO
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import JointKind
+from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot.trajectory import _rates
 from urdfkin.verify.bounds import magnitudes, movable
 from urdfkin.verify.exact.numbers import ExactJoint
@@ -56,9 +56,18 @@ def reference(request: pytest.FixtureRequest) -> Reference:
     return NEW[request.param]
 
 
+#: Configurations of the UR5, rates and second rates.
+X = np.ones((1, 6))
+
+
 @pytest.fixture(scope="module")
 def robot() -> urdfkin.Robot:
     return urdfkin.load("ur5", verify=False)
+
+
+@pytest.fixture(scope="module")
+def plan(robot: urdfkin.Robot) -> CompiledTree:
+    return compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
 
 
 def test_a_reference_frame_without_axes_and_point_cannot_be_defined() -> None:
@@ -67,57 +76,41 @@ def test_a_reference_frame_without_axes_and_point_cannot_be_defined() -> None:
 
 
 @pytest.mark.parametrize("row", REFERRED, ids=lambda row: row.name)
-def test_the_recursion_refuses_a_new_reference_frame(
-    robot: urdfkin.Robot, reference: Reference, row: Quantity
-) -> None:
-    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
-    x = np.zeros((1, robot.nq))
+def test_the_recursion_refuses_a_new_reference_frame(plan: Any, reference: Reference, row: Quantity) -> None:
     with pytest.raises(REFUSED):
-        row.ours(plan, (x, x, x), reference)
+        row.ours(plan, (X, X, X), reference)
 
 
 @pytest.mark.parametrize("name", ["velocity", "jacobian", "jacobian rate", "hessian", "acceleration"])
-def test_the_fast_functions_refuse_a_new_reference_frame(
-    robot: urdfkin.Robot, reference: Reference, name: str
-) -> None:
-    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
+def test_the_fast_functions_refuse_a_new_reference_frame(plan: Any, reference: Reference, name: str) -> None:
     with pytest.raises(REFUSED):
         single(name.replace(" ", "_"), plan, reference)
 
 
 def test_the_split_of_an_acceleration_refuses_a_new_reference_frame(robot: urdfkin.Robot) -> None:
-    x = np.zeros((1, robot.nq))
     with pytest.raises(REFUSED):
-        acceleration_breakdown(robot.tree, 3, x, x, x, NEW["bare"])
+        acceleration_breakdown(robot.tree, 3, X, X, X, NEW["bare"])
 
 
 @pytest.mark.parametrize("name", sorted(EXPORTED.keys() - {"placement"}))
-def test_exported_code_refuses_a_new_reference_frame(robot: urdfkin.Robot, name: str) -> None:
-    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
+def test_exported_code_refuses_a_new_reference_frame(plan: CompiledTree, name: str) -> None:
     with pytest.raises(REFUSED):
         function_of(plan, QUANTITIES[name], NEW["bare"])
 
 
 @pytest.mark.parametrize("row", REFERRED, ids=lambda row: row.name)
-def test_bounds_refuse_a_reference_frame_without_properties(robot: urdfkin.Robot, row: Quantity) -> None:
-    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
-    x = np.ones((1, robot.nq))
-    size = magnitudes(plan, x, x, x, STILL_STATE)
+def test_bounds_refuse_a_reference_frame_without_properties(plan: CompiledTree, row: Quantity) -> None:
     if row.name.split()[-1] == "jacobian":
         with pytest.raises(REFUSED):
             movable(plan, NEW["bare"])
         return  # the size of a Jacobian's terms is the same in each reference frame
     with pytest.raises(REFUSED):
-        row.bound(plan, size, NEW["bare"])
+        row.bound(plan, magnitudes(plan, X, X, X, STILL_STATE), NEW["bare"])
 
 
-def test_the_bound_of_a_hessian_refuses_a_new_reference_frame(
-    robot: urdfkin.Robot, reference: Reference
-) -> None:
-    plan = compile_tree(robot.tree, [robot.tree.frame_link(robot.tip_frame)])
-    x = np.ones((1, robot.nq))
+def test_the_bound_of_a_hessian_refuses_a_new_reference_frame(plan: Any, reference: Reference) -> None:
     with pytest.raises(REFUSED):
-        QUANTITIES["hessian"].bound(plan, magnitudes(plan, x, x, x, STILL_STATE), reference)
+        QUANTITIES["hessian"].bound(plan, magnitudes(plan, X, X, X, STILL_STATE), reference)
 
 
 @pytest.mark.parametrize("oracle", ORACLES)
@@ -129,12 +122,11 @@ def test_the_oracles_refuse_a_new_reference_frame(
         pytest.importorskip("mujoco")
         if row.name == "hessian":
             return
-    x = np.zeros((1, robot.nq))
     model = ORACLES[oracle].oracle(robot.urdf, robot.tree)
     joints = row.of == "joints"
     frame = f"joint:{robot.joint_names[0]}" if joints else robot.tip_frame
     with pytest.raises(REFUSED):
-        row.ask(model, QueryBatch([frame], (x, x, x), reference, joints=joints))
+        row.ask(model, QueryBatch([frame], (X, X, X), reference, joints=joints))
 
 
 def test_the_kernels_and_the_command_line_know_the_members_of_the_enumeration() -> None:
@@ -158,30 +150,24 @@ def test_a_joint_kind_without_its_properties_cannot_be_defined() -> None:
         cast("Any", JointKind)._new_member_(JointKind, "screw")
 
 
-BRANCHES: Mapping[str, Callable[[Any], object]] = {
-    "pose": lambda kind: pose_of(kind, np.zeros(2)),
-    "coordinates": lambda kind: coordinates_of(kind, np.eye(4)),
-}
-
-
-@pytest.mark.parametrize("branch", BRANCHES)
-def test_poses_refuse_a_new_joint_kind(branch: str) -> None:
+@pytest.mark.parametrize(("branch", "x"), [(pose_of, np.zeros(2)), (coordinates_of, np.eye(4))])
+def test_poses_refuse_a_new_joint_kind(branch: Callable[..., object], x: FloatArray) -> None:
     with pytest.raises(REFUSED):
-        BRANCHES[branch](new_kind())
+        branch(new_kind(), x)
+
+
+def plan_of_last(robot: urdfkin.Robot) -> CompiledTree:
+    return compile_tree(robot.tree, [len(robot.tree.joints)])
 
 
 METHODS: Mapping[str, Callable[[urdfkin.Robot, Any], object]] = {
     "recursion": lambda robot, x: robot.placement(x, robot.tip_frame, verify=False),
     "split": lambda robot, x: robot.acceleration_breakdown(x, x, x, robot.tip_frame, verify=False),
-    "size of terms": lambda robot, x: magnitudes(
-        compile_tree(robot.tree, [len(robot.tree.joints)]), x, x, x, STILL_STATE
-    ),
+    "size of terms": lambda robot, x: magnitudes(plan_of_last(robot), x, x, x, STILL_STATE),
     "sample": lambda robot, _: robot.sample(1),
     "names": lambda robot, _: robot.coordinate_names,
     "convention": lambda robot, _: robot.convention("mujoco"),
-    "export": lambda robot, _: function_of(
-        compile_tree(robot.tree, [len(robot.tree.joints)]), QUANTITIES["velocity"], Reference.WORLD
-    ),
+    "export": lambda robot, _: function_of(plan_of_last(robot), QUANTITIES["velocity"], Reference.WORLD),
     "same": lambda robot, _: urdfkin.same(robot, robot),
     "digits": lambda robot, x: move(robot.tree, {0: ExactJoint(IDENTITY, ZERO, IDENTITY[0], 1, 0)}, x, x, x),
     "velocities": lambda robot, x: _rates(robot.tree, np.stack((x, x, x)), np.arange(3.0)),

@@ -12,40 +12,25 @@ import pytest
 
 import urdfkin
 from tests.random_chains import rotation, shift
+from tests.random_chains import z_joint as joint
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.configuration import from_pinocchio, limit_violations, to_pinocchio
 from urdfkin.model.mechanisms.mechanism import apart
-from urdfkin.model.tree import (
-    FloatArray,
-    Joint,
-    JointKind,
-    KinematicTree,
-    Limit,
-    Mimic,
-    build_tree,
-    with_root_joint,
-)
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree, with_root_joint
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
-
-
-def joint(name: str, kind: JointKind = JointKind.REVOLUTE, mimic: Mimic | None = None) -> Joint:
-    return Joint(name, kind, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), mimic=mimic)
 
 
 @pytest.fixture
 def hand() -> KinematicTree:
     """A palm with a thumb of one joint and a finger of two, the second following the first."""
-    return build_tree(
-        "hand",
-        "palm",
-        [
-            (joint("tip", mimic=Mimic("finger", 0.5, 0.1)), "finger_link", "tip_link"),
-            (joint("thumb", JointKind.CONTINUOUS), "palm", "thumb_link"),
-            (joint("mount", JointKind.FIXED), "tip_link", "nail"),
-            (joint("finger"), "palm", "finger_link"),
-        ],
-    )
+    rows = [
+        (joint("tip", mimic=Mimic("finger", 0.5, 0.1)), "finger_link", "tip_link"),
+        (joint("thumb", kind=JointKind.CONTINUOUS), "palm", "thumb_link"),
+        (joint("mount", kind=JointKind.FIXED), "tip_link", "nail"),
+        (joint("finger"), "palm", "finger_link"),
+    ]
+    return build_tree("hand", "palm", rows)
 
 
 def test_joints_stand_depth_first_and_siblings_by_name(hand: KinematicTree) -> None:
@@ -100,8 +85,7 @@ def test_a_loop_or_an_island_is_refused() -> None:
 
 
 def test_a_follower_of_a_follower_is_refused() -> None:
-    first = joint("b", mimic=Mimic("a", 1.0, 0.0))
-    second = joint("c", mimic=Mimic("b", 1.0, 0.0))
+    first, second = joint("b", mimic=Mimic("a", 1.0, 0.0)), joint("c", mimic=Mimic("b", 1.0, 0.0))
     with pytest.raises(InputError, match="mimic only an independent joint"):
         build_tree("r", "l0", [(joint("a"), "l0", "l1"), (first, "l1", "l2"), (second, "l2", "l3")])
 
@@ -161,9 +145,8 @@ def test_a_step_is_pinocchios_and_its_difference_leads_back(name: str, root: str
     if root == "floating":
         v[:, 3:6] *= min(1.0, 3.0 / np.linalg.norm(v[:, 3:6], axis=1).max())
     ahead = robot.integrate(q, v)
-    theirs = np.array(
-        [pinocchio.integrate(model, *pair) for pair in zip(robot.to_pinocchio(q), v, strict=True)]
-    )
+    pairs = zip(robot.to_pinocchio(q), v, strict=True)
+    theirs = np.array([pinocchio.integrate(model, *pair) for pair in pairs])
     assert same_pose(robot.to_pinocchio(ahead), theirs) < 64 * EPS * (1.0 + np.abs(theirs).max())
     back = robot.difference(q, ahead)
     np.testing.assert_allclose(back, v, rtol=0.0, atol=256 * EPS * (4.0 + size))
@@ -195,8 +178,7 @@ def test_the_frames_velocity_is_the_difference_quotient_along_a_step() -> None:
     robot, _ = both("a1", "floating")
     q, v = robot.sample(1, seed=5)[0], np.random.default_rng(6).uniform(-1.0, 1.0, robot.nv)
     h = 1e-5
-    ends = (robot.placement(robot.integrate(q, sign * h * v), "FL_foot")[:3, 3] for sign in (1.0, -1.0))
-    ahead, behind = ends
+    ahead, behind = (robot.placement(robot.integrate(q, x * v), "FL_foot")[:3, 3] for x in (h, -h))
     np.testing.assert_allclose((ahead - behind) / (2 * h), robot.velocity(q, v, "FL_foot")[:3], atol=1e-8)
 
 
@@ -225,9 +207,8 @@ LOWER, UPPER = -0.7, 1.3
 
 def two_joints(mimic: Mimic | None = None) -> KinematicTree:
     """A joint `a` with bounds, and a sliding one `b` that may go from 0 to 0.1 m."""
-    z = np.array([0.0, 0.0, 1.0])
-    a = Joint("a", JointKind.REVOLUTE, 0, np.eye(4), z, Limit(LOWER, UPPER, 1.0, 1.0))
-    b = Joint("b", JointKind.PRISMATIC, 0, np.eye(4), z, Limit(0.0, 0.1, 1.0, 1.0), mimic)
+    a = joint("a", limit=Limit(LOWER, UPPER, 1.0, 1.0))
+    b = joint("b", kind=JointKind.PRISMATIC, limit=Limit(0.0, 0.1, 1.0, 1.0), mimic=mimic)
     return build_tree("two", "l0", [(a, "l0", "l1"), (b, "l1", "l2")])
 
 
@@ -248,10 +229,8 @@ def test_however_little_a_joint_is_outside_it_is_said(bound: float, sign: float,
 
 def test_the_worst_value_of_a_batch_is_told_for_each_joint() -> None:
     q = np.array([[[1.4, -0.2], [1.9, 0.0]], [[-0.8, 0.3], [0.0, 0.05]]])
-    assert limit_violations(two_joints(), q) == [
-        "joint a: 1.9 is outside [-0.7, 1.3]",
-        "joint b: -0.2 is outside [0, 0.1]",
-    ]
+    said = ["joint a: 1.9 is outside [-0.7, 1.3]", "joint b: -0.2 is outside [0, 0.1]"]
+    assert limit_violations(two_joints(), q) == said
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.15, None), (0.21, "0.11"), (-0.01, None), (-0.02, "-0.005")])
@@ -261,26 +240,20 @@ def test_a_follower_is_held_to_its_own_bounds(a: float, b: str | None) -> None:
 
 
 def test_a_joint_without_bounds_and_a_batch_without_rows_are_never_outside() -> None:
-    free = Joint("c", JointKind.CONTINUOUS, 0, np.eye(4), np.array([0.0, 0.0, 1.0]))
-    tree = build_tree("free", "l0", [(free, "l0", "l1")])
+    tree = build_tree("free", "l0", [(joint("c", kind=JointKind.CONTINUOUS), "l0", "l1")])
     assert limit_violations(tree, np.array([1e9])) == []
     assert limit_violations(two_joints(), np.empty((0, 2))) == []
 
 
 def with_everything() -> KinematicTree:
     """A wheel, a planar joint, and a follower of the wheel that turns without end too."""
-    z = np.array([0.0, 0.0, 1.0])
-    kinds = [
-        ("wheel", JointKind.CONTINUOUS, None),
-        ("table", JointKind.PLANAR, None),
-        ("slide", JointKind.PRISMATIC, Mimic("wheel", -2.0, 0.3)),
-        ("gear", JointKind.CONTINUOUS, Mimic("wheel", 3.0, 0.1)),
+    joints = [
+        joint("wheel", kind=JointKind.CONTINUOUS),
+        joint("table", kind=JointKind.PLANAR),
+        joint("slide", kind=JointKind.PRISMATIC, mimic=Mimic("wheel", -2.0, 0.3)),
+        joint("gear", kind=JointKind.CONTINUOUS, mimic=Mimic("wheel", 3.0, 0.1)),
     ]
-    rows = [
-        (Joint(name, kind, 0, np.eye(4), z, mimic=mimic), f"l{i}", f"l{i + 1}")
-        for i, (name, kind, mimic) in enumerate(kinds)
-    ]
-    return build_tree("everything", "l0", rows)
+    return build_tree("everything", "l0", [(one, f"l{i}", f"l{i + 1}") for i, one in enumerate(joints)])
 
 
 @pytest.mark.parametrize("mimic", [True, False])
@@ -297,8 +270,7 @@ def test_pinocchios_layout_leads_back(mimic: bool) -> None:
 def test_an_angle_comes_back_in_one_turn_whose_two_ends_are_in_it(angle: float, turns: int) -> None:
     tree = with_everything()
     there = to_pinocchio(tree, np.full(4, angle + turns * math.tau), mimic=True)
-    back = from_pinocchio(tree, there, mimic=True)
-    found = back[[0, 3]]  # the wheel's, and the planar joint's
+    found = from_pinocchio(tree, there, mimic=True)[[0, 3]]  # the wheel's, and the planar joint's
     assert (np.abs(found) <= math.pi).all()
     np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * angle), atol=1e-14)
     if not turns:

@@ -24,23 +24,18 @@ HOSTILE_URDF = robot(
 
 
 @cache
-def _arms() -> str:
-    return json.dumps(validate(["panda", "ur5"], samples=6).as_dict(), allow_nan=False)
+def _run(robots: tuple[str, ...], samples: int) -> str:
+    return json.dumps(validate([*robots], samples=samples).as_dict(), allow_nan=False)
 
 
 def arms() -> Document:
     """A run over two arms; a fresh copy each time."""
-    return cast("Document", json.loads(_arms()))
-
-
-@cache
-def _hostile() -> str:
-    return json.dumps(validate([HOSTILE_URDF, "ur5"], samples=4).as_dict(), allow_nan=False)
+    return cast("Document", json.loads(_run(("panda", "ur5"), 6)))
 
 
 def hostile() -> Document:
     """A run over a robot whose names are attacks, and one that is sane."""
-    document = cast("Document", json.loads(_hostile()))
+    document = cast("Document", json.loads(_run((HOSTILE_URDF, "ur5"), 4)))
     document["robots"][0]["source"] = HOSTILE_ROBOT  # a file may be called so
     return document
 
@@ -50,7 +45,7 @@ def failing() -> Document:
     document = arms()
     panda, ur5 = document["robots"]
     check = next(c for c in panda["checks"] if c["quantity"] == "velocity" and c["reference"] == "local")
-    beyond_numbers(check, 4, panda["frames"][4])
+    beyond_numbers(check, panda["frames"].index("joint:panda_joint4"), "joint:panda_joint4")
     panda |= {"verdict": "disagrees", "failed": 3, "reason": "3 of 8,000 results lie outside their bound"}
     broken = copy.deepcopy(ur5)
     broken |= {"source": "broken.urdf", "name": "broken.urdf", "verdict": "bad input", "model": None}
@@ -73,9 +68,7 @@ def beyond_numbers(check: Check, place: int, frame: str) -> None:
     assert case is not None
     case |= {"frame": frame, "disagreement": None}
     check |= {"failed": 3, "worst": None, "share_of_bound": None}
-    check["median"], check["p99"] = (
-        percentile(check["histogram"], edges, math.inf, percent) for percent in (50.0, 99.0)
-    )
+    check["median"], check["p99"] = (percentile(check["histogram"], edges, math.inf, x) for x in (50.0, 99.0))
 
 
 def run_on(day: int, document: Document) -> Document:

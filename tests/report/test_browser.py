@@ -104,9 +104,7 @@ def test_paper_folds_neither_worst_cases_nor_findings(browser: Browser) -> None:
     assert browser.js(folded) == before
 
 
-def test_a_phone_shows_verdict_and_share_of_the_bound_beside_the_name(
-    screen: Browser, pages: dict[str, Path]
-) -> None:
+def test_a_phone_shows_verdict_and_share_of_the_bound_by_the_name(screen: Browser, pages: Any) -> None:
     screen.become(390, 844)
     screen.open(pages["failing"])
     edges = screen.js(
@@ -130,9 +128,7 @@ def test_the_tables_frames_can_be_shown_in_both_conventions(browser: Browser) ->
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5"])
-def test_links_and_tables_are_drawn_where_the_robot_has_them(
-    name: str, desk: Browser, pages: dict[str, Path]
-) -> None:
+def test_links_and_tables_are_drawn_where_the_robot_has_them(name: str, desk: Browser, pages: Any) -> None:
     """The view's own kinematics, from seven digits, against the library's."""
     robot = urdfkin.load(name)
     document = arms()
@@ -224,19 +220,15 @@ def test_it_reads_well_in_both_themes_at_both_widths(
 
 
 @pytest.mark.parametrize("width", [1280, 980, 760])
-def test_no_column_is_cut_and_no_card_stands_alone(
-    width: int, pages: dict[str, Path], tmp_path: Path
-) -> None:
+def test_no_column_is_cut_and_no_card_is_alone(width: int, pages: dict[str, Path], tmp_path: Path) -> None:
     with opened(tmp_path, width=width, height=1000) as browser:
         browser.open(pages["arms"])
         browser.js("document.querySelector('details.robot').open = true")
         browser.settle()
         for table in ("#overview", ".checks") if width > 900 else ("#overview",):
-            wide, room = browser.js(
-                "const table = document.querySelector(arguments[0]);"
-                "return [table.scrollWidth, table.parentElement.clientWidth]",
-                table,
-            )
+            measured = "const x = document.querySelector(arguments[0]);"
+            measured += "return [x.scrollWidth, x.parentElement.clientWidth]"
+            wide, room = browser.js(measured, table)
             assert wide <= room, table
         tops = browser.js("return [...document.querySelectorAll('.tiles div')].map(card => card.offsetTop)")
         assert len(tops) == 7
@@ -316,16 +308,12 @@ def test_a_link_to_findings_loads_the_robots_file_and_shows_them(desk: Browser, 
     )
 
 
-@pytest.mark.parametrize(
-    ("change", "said"), [("gone", "is not there"), ("other", "belongs to another report")]
-)
-def test_a_file_that_is_gone_or_another_reports_is_said(
-    change: str, said: str, desk: Browser, fleet: Path
-) -> None:
+@pytest.mark.parametrize("said", ["is not there", "belongs to another report"])
+def test_a_file_that_is_gone_or_another_reports_is_said(said: str, desk: Browser, fleet: Path) -> None:
     file = fleet.parent / "fleet-robots" / "5.js"
     text = file.read_text("utf-8")
     try:
-        if change == "gone":
+        if said == "is not there":
             file.unlink()
         else:
             file.write_text('urdfkinRobot(["0", 5, "<p>other</p>"]);', encoding="utf-8")
@@ -350,9 +338,8 @@ def test_a_robot_in_a_cell_is_drawn_where_it_was_put_and_asks_for_nothing(tmp_pa
         browser.open(notebook)
         browser.chrome.switch_to.frame(0)
         browser.wait("return Number(document.querySelector('canvas').dataset.drawn || 0) > 0")
-        outputs = browser.js(
-            "return [...document.querySelectorAll('.sliders output')].map((o) => o.textContent)"
-        )
+        texts = "[...document.querySelectorAll('.sliders output')].map((o) => o.textContent)"
+        outputs = browser.js(f"return {texts}")
         assert outputs == ["30.0°", "-45.0°", "0.0°", "-135.0°", "0.0°", "90.0°", "45.0°", "0.0010 m"]
         browser.screenshot("cell")
         assert browser.errors() == []

@@ -4,7 +4,7 @@ import copy
 import math
 from functools import reduce
 from operator import getitem
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -30,11 +30,7 @@ def test_a_report_equals_itself_and_a_robot_is_known_again_in_one_file_of_anothe
 #: What changed: its place in the document, its new value (none: it is gone), and what is said.
 WORSE: dict[str, tuple[tuple[Any, ...], Any, str]] = {
     "a robot is gone": (("robots", 1), None, "ur5: robot: verified -> nothing"),
-    "failures": (
-        ("robots", 0, "checks", 0, "failed"),
-        2,
-        "placement: 0 outside the bound -> 2 outside the bound",
-    ),
+    "failures": (("robots", 0, "checks", 0, "failed"), 2, "0 outside the bound -> 2 outside the bound"),
     "a quantity is gone": (("robots", 0, "checks", 0), None, "panda: placement: compared -> nothing"),
     "fewer results": (("robots", 0, "checks", 0, "results"), 224, "placement: 225 results -> 224 results"),
     "more": (("robots", 0, "checks", 0, "worst"), 100.0, "-> 100.00 eps*scale"),
@@ -74,8 +70,8 @@ def test_growth_counts_from_the_factor_on_and_above_a_single_rounding(
     before: float, after: float, factor: float, regression: bool
 ) -> None:
     old, new = arms(), arms()
-    old["robots"][0]["checks"][0]["worst"] = before
-    new["robots"][0]["checks"][0]["worst"] = after
+    for document, worst in ((old, before), (new, after)):
+        document["robots"][0]["checks"][0]["worst"] = worst
     assert compare(old, new, factor).exit_code == int(regression)
 
 
@@ -116,16 +112,15 @@ def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_however_little_it_i
 
 
 def test_a_joint_that_follows_another_way_is_gone_or_new_is_told() -> None:
-    old: Any = arms()
-    new: Any = arms()
-    for document, mimic in ((old, None), (new, {"leader": "wheel", "multiplier": -2.0, "offset": 0.25})):
-        document["robots"][1]["model"]["joints"][2]["mimic"] = mimic
-    (told,) = model_changes(old["robots"][1]["model"], new["robots"][1]["model"])
+    before, after = (cast("Any", arms())["robots"][1]["model"] for _ in range(2))
+    before["joints"][2]["mimic"] = None
+    after["joints"][2]["mimic"] = {"leader": "wheel", "multiplier": -2.0, "offset": 0.25}
+    (told,) = model_changes(before, after)
     assert told[0].endswith(", mimic rule")
     assert told[1:] == ("none", "-2 * wheel +0.25")
-    old, new = arms(), arms()
-    new["robots"][1]["model"]["joints"][2]["name"] = "other"
-    name = old["robots"][1]["model"]["joints"][2]["name"]
+    new: Any = arms()
+    joint = new["robots"][1]["model"]["joints"][2]
+    name, joint["name"] = joint["name"], "other"
     lines = words(arms(), new)
     assert (False, f"ur5: joint {name}: revolute -> nothing") in lines
     assert (False, "ur5: joint other: nothing -> revolute") in lines
@@ -154,16 +149,12 @@ def test_a_wider_bound_and_tables_that_are_compared_no_more_are_regressions() ->
 
 
 def test_a_share_of_the_bound_counts_from_the_factor_on_and_from_a_tenth() -> None:
-    for share_old, share_new, regression in (
-        (0.2, 0.39, False),
-        (0.2, 0.41, True),
-        (0.01, 0.099, False),
-        (0.04, 0.11, True),
-        (0.2, None, True),
-    ):
+    grown = (0.2, 0.41), (0.04, 0.11), (0.2, None)
+    for share_old, share_new in (*grown, (0.2, 0.39), (0.01, 0.099)):
         old, new = arms(), arms()
         old["robots"][0]["checks"][0]["share_of_bound"] = share_old
         new["robots"][0]["checks"][0]["share_of_bound"] = share_new
+        regression = (share_old, share_new) in grown
         assert bool(compare(old, new).regressions) is regression, (share_old, share_new)
 
 
@@ -197,10 +188,9 @@ def test_the_markdown_leads_with_regressions_and_counts_what_does_not_fit() -> N
     whole = markdown_of(old, new, found)
     room = len(whole) + 100  # what is kept free for the last line
     assert markdown_of(old, new, found, room) == whole
-    assert markdown_of(old, new, found, room - 1).endswith(
-        "\n1 further change left out: the comment is full.\n"
-    )
-    assert len(markdown_of(old, new, found, room - 1)) <= room - 1
+    cut = markdown_of(old, new, found, room - 1)
+    assert cut.endswith("\n1 further change left out: the comment is full.\n")
+    assert len(cut) <= room - 1
 
 
 def test_robots_that_were_given_several_times_are_told_apart_by_number() -> None:
@@ -214,9 +204,7 @@ def test_robots_that_were_given_several_times_are_told_apart_by_number() -> None
 
 
 @pytest.mark.parametrize(("before", "after"), [(0, 1), (1, 0), (1, 3), (2, 1), (2, 2), (0, 0)])
-def test_findings_of_one_code_are_counted_with_their_other_places_and_notes_are_not(
-    before: int, after: int
-) -> None:
+def test_findings_of_one_code_count_with_their_other_places_and_notes_do_not(before: int, after: int) -> None:
     old: Any = arms()
     new = copy.deepcopy(old)
     finding = {"code": "URDF999", "severity": "warning", "also": []}

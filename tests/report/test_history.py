@@ -93,18 +93,15 @@ def test_a_store_is_a_run(tmp_path: Path) -> None:
     validate("planar_two_link", samples=2, store=tmp_path / "nightly" / "store")
     put(tmp_path / "nightly" / "a.json", run_on(1, arms()))
     found = history([tmp_path / "nightly"])
-    assert {run["file"] for run in found.runs} == {
-        str(tmp_path / "nightly" / "store"), str(tmp_path / "nightly" / "a.json"),
-    }  # fmt: skip
+    assert {run["file"] for run in found.runs} == {str(tmp_path / "nightly" / x) for x in ("store", "a.json")}
     assert found.exit_code == 0
 
 
 def test_a_broken_file_or_a_pipe_is_named_and_the_rest_is_shown(month: Path) -> None:
     os.mkfifo(month / "pipe.json")
     found = history([month])
-    assert [(Path(one["file"]).name, one["reason"][:18]) for one in found.unusable] == [
-        ("pipe.json", "not a regular file")
-    ]
+    unusable = [(Path(one["file"]).name, one["reason"][:18]) for one in found.unusable]
+    assert unusable == [("pipe.json", "not a regular file")]
     (month / "broken.json").write_text(json.dumps(arms())[:500])
     (month / "other.json").write_text('{"schema": "other/1"}')
     edited = arms()

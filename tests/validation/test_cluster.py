@@ -29,7 +29,9 @@ from distributed import Client, LocalCluster
 from distributed.comm.core import CommClosedError
 from distributed.core import Status
 
+from tests.reading import present
 from tests.validation.test_store import numbers
+from tests.validation.test_workers import DIED
 from urdfkin.errors import InputError
 from urdfkin.system.processes import own_python
 from urdfkin.validation import cluster
@@ -67,13 +69,12 @@ def two() -> Iterator[Cluster]:
 def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cluster, LocalCluster]]:
     """Two of Dask's worker processes, which can be killed, and the cluster that replaces them."""
     folder = str(tmp_path_factory.mktemp("dask"))
+    how: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
     with (
         pytest.MonkeyPatch.context() as patch,
         # Dask never replaces a worker whose successor takes longer than this; its own value is 15 s.
         dask.config.set({"distributed.deploy.lost-worker-timeout": "600s"}),
-        LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", local_directory=folder
-        ) as there,
+        LocalCluster(n_workers=2, local_directory=folder, **how) as there,
     ):
         # Dask's own workers import the main module again, which would run these tests where it has no guard.
         patch.delattr(sys.modules["__main__"], "__file__", raising=False)
@@ -120,9 +121,7 @@ def test_nothing_of_a_local_cluster_lies_where_another_user_could_have_put_it(
     assert [place.name for place in tmp_path.iterdir()] == ["dask-scratch-space"]
 
 
-def test_a_process_of_ours_takes_no_module_from_dasks_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_process_takes_a_module_from_dasks_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As a worker on a real cluster has it, where Dask has put it on the path before urdfkin is there."""
     for folder in ("dask-scratch-space", "dask-scratch-space-1000/worker-x"):
         (tmp_path / folder).mkdir(parents=True)
@@ -137,16 +136,13 @@ def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobo
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = (Path(__file__).parents[2] / "docs" / "campaigns.md").read_text("utf-8")
-    make = re.search(r"^openssl req .*$", page, re.MULTILINE)
-    settings = re.search(r"^```yaml\n(distributed:.*?)^```$", page, re.MULTILINE | re.DOTALL)
-    assert make is not None
-    assert settings is not None
+    make = present(re.search(r"^openssl req .*$", page, re.MULTILINE))
+    text = present(re.search(r"^```yaml\n(distributed:.*?)^```$", page, re.MULTILINE | re.DOTALL))[1]
     stranger = tmp_path / "stranger"
     stranger.mkdir()
     for folder in (tmp_path, stranger):
         subprocess.run(make[0].split(), cwd=folder, check=True, capture_output=True)
     config = tmp_path / "dask.yaml"
-    text = settings[1]
     config.write_text(text.replace("/home/me/dask", str(tmp_path)))
 
     def key_of(folder: Path) -> dict[str, Any]:
@@ -156,17 +152,8 @@ def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobo
         return merged
 
     with programs(tmp_path, DASK_CONFIG=str(config)) as start:
-        start("scheduler", "--port", "0", "--host", "127.0.0.1")
-        start(
-            "worker",
-            "--host",
-            "127.0.0.1",
-            "--nthreads",
-            "1",
-            "--no-nanny",
-            "--local-directory",
-            str(tmp_path),
-        )
+        start("scheduler", "--port 0 --host 127.0.0.1")
+        start("worker", f"--host 127.0.0.1 --nthreads 1 --no-nanny --local-directory {tmp_path}")
         address = _address(tmp_path)
         assert address.startswith("tls://127.0.0.1:")
         for other in (address, address.replace("tls", "tcp")):
@@ -235,11 +222,8 @@ def test_a_robot_that_kills_its_process_is_blamed_and_none_of_its_neighbours(
     finally:
         two._client.run(_deadly, str(deaths), "urdfkin.validation.worker_processes")
     assert [i for i, robot in enumerate(report.robots) if robot.verdict != Verdict.VERIFIED] == [25]
-    reason = (
-        "ur5: the process that validated the robot crashed twice; the second time it computed"
-        " nothing else: found signal SIGSEGV"
-    )
-    assert report.robots[25].reason == reason
+    words = "crashed twice; the second time it computed nothing else"
+    assert report.robots[25].reason == DIED.format(words)
     assert deaths.read_text() == "97"
     assert two._client.run(os.getpid) == workers
 
@@ -288,13 +272,11 @@ def programs(folder: Path, **env: str) -> Iterator[Callable[..., subprocess.Pope
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), **env}
     started = list[subprocess.Popen[bytes]]()
 
-    def start(role: str, *words: str) -> subprocess.Popen[bytes]:
-        place = str(folder / "scheduler.json")
-        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", "--scheduler-file", place, *words]
+    def start(role: str, words: str) -> subprocess.Popen[bytes]:
+        words = f"--scheduler-file {folder}/scheduler.json {words} --no-dashboard"
         out = (folder / f"{role}.txt").open("wb")
-        started.append(
-            subprocess.Popen([*command, "--no-dashboard"], env=environment, stdout=out, stderr=out)
-        )
+        command = [sys.executable, "-m", f"distributed.cli.dask_{role}", *words.split()]
+        started.append(subprocess.Popen(command, env=environment, stdout=out, stderr=out))
         return started[-1]
 
     try:
@@ -356,14 +338,11 @@ def test_workers_may_come_and_go(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(counts) >= 1
 
 
-def test_another_version_is_refused_before_anything_is_sent(
-    two: Cluster, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_version_is_refused_before_any_work(two: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     other = provenance() | {"pin": "3.0.0", "code": "0" * 64}
     monkeypatch.setattr(cluster, "provenance", lambda: other)
-    with pytest.raises(
-        ClusterError, match=r"different versions of the code: found pin 4\S* on the cluster and 3"
-    ):
+    words = r"different versions of the code: found pin 4\S* on the cluster and 3"
+    with pytest.raises(ClusterError, match=words):
         cluster._demand_same(two._client)
     report = validate("planar_two_link", samples=0, executor=two)  # a worker that came later
     assert "the cluster and this machine have different versions of the code" in str(report.robots[0].reason)
@@ -393,8 +372,8 @@ def _clients() -> set[int]:
 
 def test_a_lost_scheduler_loses_nothing_that_the_store_holds(undisturbed: str, tmp_path: Path) -> None:
     with programs(tmp_path) as start:
-        scheduler = start("scheduler", "--port", "0", "--host", "127.0.0.1")
-        start("worker", "--nthreads", "1", "--no-nanny", "--local-directory", str(tmp_path))
+        scheduler = start("scheduler", "--port 0 --host 127.0.0.1")
+        start("worker", f"--nthreads 1 --no-nanny --local-directory {tmp_path}")
 
         def killed(standing: CampaignProgress) -> None:
             if standing.chunks_done >= 3:
@@ -403,8 +382,9 @@ def test_a_lost_scheduler_loses_nothing_that_the_store_holds(undisturbed: str, t
         with contextlib.suppress(Exception), connected(_address(tmp_path)) as there:
             there._client.wait_for_workers(1, timeout=60)
             report = validate(ROBOTS, samples=SAMPLES, executor=there, store=tmp_path / "s", progress=killed)
-    assert "connection to the scheduler is lost" in str(report.robots[-1].reason)
-    assert "repeat the same command" in str(report.robots[-1].reason)
+    reason = str(report.robots[-1].reason)
+    assert "connection to the scheduler is lost" in reason
+    assert "repeat the same command" in reason
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path / "s")) == undisturbed
 
 

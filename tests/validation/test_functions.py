@@ -28,12 +28,9 @@ from urdfkin.verify.quantities import recursive_quantities
 
 #: Robots and frames: serial arms, a branched robot, a hand, and fingers that mimic.
 FRAMES = {
-    "ur5": "tool0",
-    "kinova": "j2s6s200_end_effector",
-    "a1": "FL_foot",
-    "xarm7": "link_eef",
+    "ur5": "tool0", "kinova": "j2s6s200_end_effector", "a1": "FL_foot", "xarm7": "link_eef",
     "panda": "panda_rightfinger",
-}
+}  # fmt: skip
 MIMICS = {
     "panda": "panda_rightfinger",
     "talos": "gripper_left_fingertip_1_link",
@@ -124,42 +121,41 @@ def test_the_frame_of_a_wrong_point_is_named(name: str, quantity: str) -> None:
     assert any(f"that of the frame {other!r}" in words for words in found.diagnoses), found
 
 
+def flip(x: np.ndarray, at: list[int]) -> np.ndarray:
+    x = x.copy()
+    x[at[0]] *= -1.0
+    return x
+
+
+def exchange(x: np.ndarray, at: list[int]) -> np.ndarray:
+    x = x.copy()
+    x[at] = x[at[::-1]]
+    return x
+
+
 @pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
 @pytest.mark.parametrize("name", FRAMES)
 def test_the_sign_and_the_exchange_of_joints_are_named(name: str, quantity: str) -> None:
     robot, frame = robot_of(name), FRAMES[name]
     tree = robot.tree
-    path = [i for i in tree.path(tree.frame_link(frame)) if tree.joints[i].nv]
-    (q1, v1), (q2, v2) = ((tree.q_index[i], tree.v_index[i]) for i in path[1:3])
-    one, other = (tree.joints[i].name for i in path[1:3])
+    path = [i for i in tree.path(tree.frame_link(frame)) if tree.joints[i].nv][1:3]
+    at_q, at_v = ([each[i] for i in path] for each in (tree.q_index, tree.v_index))
+    one, other = (tree.joints[i].name for i in path)
     right = computed(robot, quantity, frame)
 
-    def columns(result: np.ndarray, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        for axis in range(1, result.ndim) if "nv" in str(quantity_shape(quantity)) else ():
-            result = np.moveaxis(change(np.moveaxis(result, axis, 0)), 0, axis)
-        return result
+    def wrong(change: Callable[..., np.ndarray]) -> Callable[..., Any]:
+        def function(q: np.ndarray, *rates: np.ndarray) -> Any:
+            result = right(change(q, at_q), *(change(x, at_v) for x in rates))
+            for axis in range(1, result.ndim) if "nv" in str(quantity_shape(quantity)) else ():
+                result = np.moveaxis(change(np.moveaxis(result, axis, 0), at_v), 0, axis)
+            return result
 
-    def flip(x: np.ndarray, at: int) -> np.ndarray:
-        x = x.copy()
-        x[at] *= -1.0
-        return x
+        return function
 
-    def exchange(x: np.ndarray, at: list[int]) -> np.ndarray:
-        x = x.copy()
-        x[at] = x[at[::-1]]
-        return x
-
-    def flipped(q: np.ndarray, *rates: np.ndarray) -> np.ndarray:
-        return columns(right(flip(q, q1), *(flip(x, v1) for x in rates)), lambda x: flip(x, v1))
-
-    def exchanged(q: np.ndarray, *rates: np.ndarray) -> np.ndarray:
-        inputs = exchange(q, [q1, q2]), *(exchange(x, [v1, v2]) for x in rates)
-        return columns(right(*inputs), lambda x: exchange(x, [v1, v2]))
-
-    found = check(name, quantity, flipped)
-    assert any(f"{one!r} has the opposite sign" in words for words in found.diagnoses), found
-    found = check(name, quantity, exchanged)
-    assert any(f"{one!r} and {other!r} are exchanged" in words for words in found.diagnoses), found
+    said = (flip, f"{one!r} has the opposite sign"), (exchange, f"{one!r} and {other!r} are exchanged")
+    for change, words in said:
+        found = check(name, quantity, wrong(change))
+        assert any(words in line for line in found.diagnoses), found
 
 
 def quantity_shape(name: str) -> tuple[object, ...]:
@@ -344,14 +340,9 @@ def test_a_robot_that_no_oracle_can_check_is_compared_with_a_note() -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [
-        ({"quantity": "torque"}, "torque"),
-        ({"quantity": "joint jacobian"}, "cannot be compared"),
-        ({"factor": 0.0}, "factor must be positive"),
-        ({"samples": -1}, "samples"),
-        ({"frame": "hand"}, "hand"),
-    ],
-)
+    [({"quantity": "torque"}, "torque"), ({"quantity": "joint jacobian"}, "cannot be compared"),
+     ({"factor": 0.0}, "factor must be positive"), ({"samples": -1}, "samples"), ({"frame": "hand"}, "hand")],
+)  # fmt: skip
 def test_a_wrong_argument_is_one_error(arguments: dict[str, Any], words: str) -> None:
     with pytest.raises(urdfkin.UrdfkinError, match=words):
         verify_function(lambda q: q, robot_of("ur5"), **arguments)
@@ -365,9 +356,7 @@ def test_a_wrong_argument_is_one_error(arguments: dict[str, Any], words: str) ->
         (lambda J: np.ma.masked_array(J, True), "a masked array"),
     ],
 )
-def test_a_result_that_is_no_array_of_real_numbers_is_an_error(
-    result: Callable[..., Any], words: str
-) -> None:
+def test_a_result_that_is_no_array_of_real_numbers_is_an_error(result: Any, words: str) -> None:
     robot = robot_of("ur5")
     found = check("ur5", "jacobian", lambda q: result(robot.jacobian(q, "tool0", verify=False)))
     assert not found.agrees
@@ -427,11 +416,10 @@ def test_a_broken_program_is_reported_and_the_check_goes_on(fault: str, tmp_path
     )
     assert done.code == 1, done.err
     data = done.data
-    lost = [error["message"] for error in data["first_errors"]]
     if fault == "nan":
         assert data["diagnoses"] == ["1 results are not finite"]
     else:
-        assert words in lost[0]
+        assert words in data["first_errors"][0]["message"]
     assert data["compared"] >= 10 - 3
 
 
@@ -454,18 +442,14 @@ def test_a_file_called_as_a_library_hides_none_and_a_program_is_told_of_locked_j
 
 
 @pytest.mark.long
-@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
-def test_the_example_in_cpp_agrees(tmp_path: Path) -> None:
-    program = tmp_path / "planar"
-    subprocess.run(["g++", "-O2", ADAPTERS / "planar.cpp", "-o", program], check=True)
-    done = good("verify", str(program), "planar_two_link", "--program", "--samples", "20")
-    assert "23 of 23 results compared" in done.text
-
-
-@pytest.mark.long
-@pytest.mark.skipif(shutil.which("octave") is None, reason="no Octave")
-def test_the_example_for_octave_agrees() -> None:
+@pytest.mark.parametrize("tool", ["g++", "octave"])
+def test_the_example_in_another_language_agrees(tool: str, tmp_path: Path) -> None:
+    if shutil.which(tool) is None:
+        pytest.skip(f"no {tool}")
     target = f"octave -q {ADAPTERS / 'planar.m'}"
+    if tool == "g++":
+        target = str(tmp_path / "planar")
+        subprocess.run(["g++", "-O2", ADAPTERS / "planar.cpp", "-o", target], check=True)
     done = good("verify", target, "planar_two_link", "--program", "--samples", "20", "--timeout", "60")
     assert "23 of 23 results compared" in done.text
 
@@ -510,19 +494,18 @@ def test_all_functions_of_a_file_are_checked(tmp_path: Path) -> None:
 
 
 def test_a_bad_target_is_one_line(tmp_path: Path) -> None:
-    file = tmp_path / "mine.py"
-    file.write_text("def jacobian(q):\n    return q\n\n\ncompute = jacobian\n")
-    (tmp_path / "empty.py").write_text("x = 1\n")
-    (tmp_path / "ends.py").write_text("raise SystemExit(0)\n")
-    broken = tmp_path / "broken.py"
-    broken.write_text("1 / 0\n")
-    for target, words in (
-        ("mine", "FILE.py:FUNCTION"),
-        (f"{tmp_path / 'none.py'}:jacobian", "no such file"),
-        (f"{file}:jacobean", "jacobian"),
-        (f"{file}:compute", "pass --quantity"),
-        (str(tmp_path / "empty.py"), "no function of the file"),
-        (str(tmp_path / "ends.py"), "SystemExit"),
-        (f"{broken}:jacobian", "ZeroDivisionError"),
+    for name, text in (
+        ("mine", "def jacobian(q):\n    return q\n\n\ncompute = jacobian\n"),
+        *(("empty", "x = 1\n"), ("ends", "raise SystemExit(0)\n"), ("broken", "1 / 0\n")),
     ):
-        assert words in refused("verify", target, "ur5")
+        (tmp_path / f"{name}.py").write_text(text)
+    assert "FILE.py:FUNCTION" in refused("verify", "mine", "ur5")
+    for target, words in (
+        ("none.py:jacobian", "no such file"),
+        ("mine.py:jacobean", "jacobian"),
+        ("mine.py:compute", "pass --quantity"),
+        ("empty.py", "no function of the file"),
+        ("ends.py", "SystemExit"),
+        ("broken.py:jacobian", "ZeroDivisionError"),
+    ):
+        assert words in refused("verify", str(tmp_path / target), "ur5")

@@ -45,6 +45,18 @@ def many_digits() -> Iterator[None]:
         yield
 
 
+def demand_few_units(judged: Judgement) -> None:
+    for line in judged.lines:
+        assert max(line.urdfkin.worst, line.pinocchio.worst) < 40.0, line
+
+
+def slightly_larger(monkeypatch: pytest.MonkeyPatch, name: str, units: float) -> None:
+    """Let a function return results that are too large by some units in the last place."""
+    right = getattr(evaluate, name)
+    factor = 1.0 + units * np.finfo(np.float64).eps
+    monkeypatch.setattr(evaluate, name, lambda *asked, **how: right(*asked, **how) * factor)
+
+
 def test_decimals_are_read_as_they_are_written_and_as_many_bases_are_needed_as_samples() -> None:
     robot = urdfkin.load("planar_two_link")
     joints = read_exact(robot.urdf, robot.tree)
@@ -65,12 +77,11 @@ def test_it_agrees_to_far_more_digits_than_a_double_has_with_derivatives_of_the_
     motion_of = exact_recursion.move(tree, read_exact(text, tree), moving.q, moving.v, moving.a)
     state = motion_of.states[tree.link_index("wrist")]
     # The other source differentiates with a step of 1e-18 at 60 digits.
-    expected = (
+    for found, derivative, room in (
         (state.p, moving.d(6)(0), 1e-45),
         (state.vel, rate(moving.d(6), 0.0), 1e-33),
         (state.acc, second_rate(moving.d(6), 0.0), 1e-22),
-    )
-    for found, derivative, room in expected:
+    ):
         for row in range(3):
             assert abs(found[row] - derivative[row]) < room
 
@@ -98,21 +109,13 @@ def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() ->
     ("name", "root_joint"), [("ur3_gripper", None), ("anymal", "floating"), ("solo8", "planar")]
 )
 def test_it_judges_followers_and_free_joints_too(name: str, root_joint: str | None) -> None:
-    robot = urdfkin.load(name, root_joint=root_joint)
-    for line in judge(robot, samples=1).lines:
-        assert line.urdfkin.worst < 40.0, line
-        assert line.pinocchio.worst < 40.0, line
+    demand_few_units(judge(urdfkin.load(name, root_joint=root_joint), samples=1))
 
 
 @pytest.mark.long
 def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     right = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
-    original = evaluate.placements
-
-    def wrong(*args: object, **kwargs: object) -> FloatArray:
-        return original(*args, **kwargs) * (1.0 + 16.0 * np.finfo(np.float64).eps)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(evaluate, "placements", wrong)
+    slightly_larger(monkeypatch, "placements", 16.0)
     found = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
     assert not right["placement"].ours_is_worse
     assert found["placement"].ours_is_worse
@@ -127,13 +130,9 @@ def test_the_same_seed_gives_the_same_judgement() -> None:
     assert first != judge(urdfkin.load("polar"), samples=3, seed=5)
 
 
-def test_the_digits_of_the_true_values_grow_with_the_joints_before_a_link(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_digits_of_true_values_grow_with_joints_before_a_link(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(accuracy, "DIGITS", 15)  # too few for 20 joints, as 50 are for 200
-    for line in judge(urdfkin.load(make_pages.askew(20), verify=False), samples=1).lines:
-        assert line.urdfkin.worst < 40.0, line
-        assert line.pinocchio.worst < 40.0, line
+    demand_few_units(judge(urdfkin.load(make_pages.askew(20), verify=False), samples=1))
 
 
 @pytest.mark.parametrize(("name", "samples"), [("fixed_only", 1), ("single_link", 1), ("one_joint", 0)])
@@ -146,15 +145,11 @@ def test_where_nothing_moves_or_nothing_is_drawn_there_are_the_same_lines(name: 
 @pytest.mark.parametrize(
     ("ours", "theirs", "worse"),
     [
-        ((6.1, 1.0), (3.0, 1.0), True),
-        ((6.0, 1.0), (3.0, 1.0), False),
-        ((3.0, 0.61), (3.0, 0.3), True),
-        ((3.0, 0.6), (3.0, 0.3), False),
-        ((0.9, 0.9), (0.5, 0.5), False),
-        ((2.1, 2.1), (1.0, 1.0), True),
+        ((6.1, 1.0), (3.0, 1.0), True), ((6.0, 1.0), (3.0, 1.0), False), ((3.0, 0.61), (3.0, 0.3), True),
+        ((3.0, 0.6), (3.0, 0.3), False), ((0.9, 0.9), (0.5, 0.5), False), ((2.1, 2.1), (1.0, 1.0), True),
         ((1.9, 1.9), (1.0, 1.0), False),
     ],
-)
+)  # fmt: skip
 def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
     ours: tuple[float, float], theirs: tuple[float, float], worse: bool
 ) -> None:
@@ -197,10 +192,8 @@ def test_a_moving_base_is_a_floating_joint_that_moves_alike() -> None:
                 one = QUANTITIES[quantity].truth(on_base, link, reference)
                 other = QUANTITIES[quantity].truth(afloat, there, reference)
                 assert (abs(one - other) < 1e-40).all(), (name, quantity, reference)
-            one, other = (
-                QUANTITIES["jacobian rate"].truth(motion, k, reference)
-                for motion, k in ((on_base, link), (afloat, there))
-            )
+            rate = QUANTITIES["jacobian rate"].truth
+            one, other = rate(on_base, link, reference), rate(afloat, there, reference)
             assert (abs(one - other[:, 6:]) < 1e-40).all(), (name, reference)
 
 
@@ -214,9 +207,7 @@ def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
         assert moving.moving_base
         assert len(moving.lines) == len(still.lines)
         assert moving.lines != still.lines
-        for line in moving.lines:
-            assert line.urdfkin.worst < 40.0, line
-            assert line.pinocchio.worst < 40.0, line
+        demand_few_units(moving)
 
 
 @pytest.mark.long
@@ -277,10 +268,9 @@ def test_the_analytical_jacobian_at_fifty_digits_is_the_difference_quotient_of_i
 @pytest.mark.parametrize("name", [name for name in SEQUENCES if name.islower()])
 def test_about_fixed_axes_the_numbers_are_those_about_turning_ones_last_row_first(name: str) -> None:
     robot = urdfkin.load("panda", verify=False)
-    fixed, turning = (
-        robot.analytical_jacobian(robot.sample(5, 0), "panda_hand", representation)
-        for representation in (name, name.upper()[::-1])
-    )
+    q = robot.sample(5, 0)
+    both = (name, name.upper()[::-1])
+    fixed, turning = (robot.analytical_jacobian(q, "panda_hand", each) for each in both)
     assert (fixed[:, :3] == turning[:, :3]).all()
     assert (fixed[:, 3:] == turning[:, :2:-1]).all()
 
@@ -295,12 +285,8 @@ def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_o
         return {x.reference: x for x in judge(robot, samples=2).lines if x.quantity == quantity}
 
     quantity = "analytical jacobian"
-    right, original = lines(), evaluate.jacobians
-
-    def wrong(*args: object, **kwargs: object) -> FloatArray:
-        return original(*args, **kwargs) * (1.0 + 64.0 * np.finfo(np.float64).eps)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(evaluate, "jacobians", wrong)
+    right = lines()
+    slightly_larger(monkeypatch, "jacobians", 64.0)
     found = lines()
     assert set(right) == set(found) == {"euler angles", "quaternion"}
     for name, line in right.items():

@@ -51,9 +51,7 @@ def judged(path: Path) -> list[Any]:
 
 
 @pytest.mark.slow
-def test_it_goes_on_where_it_was_ended_and_the_report_is_that_of_one_run(
-    judge: Judge, tmp_path: Path
-) -> None:
+def test_it_goes_on_where_it_ended_and_the_report_is_that_of_one_run(judge: Judge, tmp_path: Path) -> None:
     one, again, store = tmp_path / "one.json", tmp_path / "again.json", str(tmp_path / "s")
     urdfkin(*WORDS, "--json", str(one))
     expected, judge.asked = judged(one), []
@@ -122,9 +120,7 @@ def test_a_damaged_judgement_is_told_and_made_again(judge: Judge, tmp_path: Path
         assert stored(tmp_path).judgements == ()
 
 
-def test_what_cannot_be_judged_is_said_each_time_and_tried_again_when_asked(
-    judge: Judge, tmp_path: Path
-) -> None:
+def test_what_cannot_be_judged_is_said_each_time_and_retried_if_asked(judge: Judge, tmp_path: Path) -> None:
     judge.refuses = "planar_two_link"
     words = (*WORDS, "--store", str(tmp_path))
     said = "urdfkin: planar_two_link: no accuracy result: InputError: not to be judged"
@@ -143,9 +139,8 @@ def test_a_text_that_changed_since_it_was_compared_is_not_judged(judge: Judge, t
     report = validate([str(robot)], samples=0, store=store)
     robot.write_text('<robot name="b"><link name="l"/></robot>')
     how = {"mimic": None, "root_joint": None, "xacro_args": None}
-    assert judge_all(report, [str(robot)], StudySettings(1, 0, False), store=store, how=how).judgements == (
-        None,
-    )
+    found = judge_all(report, [str(robot)], StudySettings(1, 0, False), store=store, how=how)
+    assert found.judgements == (None,)
     assert judge.asked == []
     assert not list(store.glob("chunks/*/*.judged"))
 

@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -87,11 +87,9 @@ def test_a_wrong_table_fails_its_robot(shift: Callable[..., None]) -> None:
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_of_both_conventions_the_worse_table_is_told(convention: str, shift: Callable[..., None]) -> None:
     robot = urdfkin.load("ur5")
-    good: Any
-    (good,) = chains_of(robot, robot.verifier.oracle())
+    (good,) = cast("Any", chains_of(robot, robot.verifier.oracle()))
     shift(convention)
-    bad: Any
-    (bad,) = chains_of(robot, robot.verifier.oracle())
+    (bad,) = cast("Any", chains_of(robot, robot.verifier.oracle()))
     assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
     assert bad["worst"] > 1e4 * good["worst"]
     assert bad["share_of_bound"] > 1.0 > good["share_of_bound"]
@@ -176,10 +174,8 @@ def test_a_file_called_as_a_robot_of_the_catalogue_stays_a_file(
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 def test_a_command_repeats_the_run_for_robots_with_the_same_options_and_for_a_text(tmp_path: Path) -> None:
-    floating = urdfkin.load("ur5", root_joint="floating")
-    report = validate(
-        ["planar_two_link", floating, "ur3", urdf_of("single_link"), urdf_of("odd_names")], samples=0
-    )
+    floating, texts = urdfkin.load("ur5", root_joint="floating"), map(urdf_of, ("single_link", "odd_names"))
+    report = validate(["planar_two_link", floating, "ur3", *texts], samples=0)
     assert report.command.splitlines() == [
         "urdfkin validate planar_two_link ur3 - --samples 0 --seed 0",
         "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating",
@@ -190,6 +186,7 @@ def test_a_command_repeats_the_run_for_robots_with_the_same_options_and_for_a_te
     good(*shlex.split(first.command)[1:], "--json", str(path), stdin=TEXT)
     again = json.loads(path.read_text("utf-8"))
     assert [robot["name"] for robot in again["robots"]] == ["planar_two_link", "r"]
-    assert [robot["checks"][0]["worst"] for robot in again["robots"]] == [
-        robot["checks"][0]["worst"] for robot in first.as_dict()["robots"]
-    ]
+    worst, worst_again = (
+        [robot["checks"][0]["worst"] for robot in each["robots"]] for each in (first.as_dict(), again)
+    )
+    assert worst == worst_again

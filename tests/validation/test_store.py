@@ -79,9 +79,7 @@ def test_a_stores_report_is_the_one_of_a_single_run(undisturbed: str, tmp_path: 
     assert numbers(stored(tmp_path)) == undisturbed
 
 
-def test_what_is_there_is_not_computed_again(
-    undisturbed: str, ran: list[tuple[str, int]], tmp_path: Path
-) -> None:
+def test_what_is_there_is_not_redone(undisturbed: str, ran: list[tuple[str, int]], tmp_path: Path) -> None:
     first = validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(2))
     assert first.interrupted
     assert stored(tmp_path).interrupted
@@ -95,16 +93,10 @@ def test_what_is_there_is_not_computed_again(
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "said"),
-    [
-        ({"samples": 61}, "samples 60 and 61"),
-        ({"seed": 1}, "seed 0 and 1"),
-        ({"mimic": False}, "robot 1 planar_two_link (sha256"),
-        ({"robots": ["ur5"]}, "number of robots 3 and 1"),
-    ],
-)
-def test_a_store_of_other_settings_is_refused_and_both_are_shown(
-    how: dict[str, Any], said: str, tmp_path: Path
-) -> None:
+    [({"samples": 61}, "samples 60 and 61"), ({"seed": 1}, "seed 0 and 1"),
+     ({"robots": ["ur5"]}, "number of robots 3 and 1"), ({"mimic": False}, "robot 1 planar_two_link (sha")],
+)  # fmt: skip
+def test_a_store_of_other_settings_is_refused_and_both_are_shown(how: Any, said: str, tmp_path: Path) -> None:
     validate(ROBOTS, samples=SAMPLES, store=tmp_path, progress=interrupted_after(1))
     with pytest.raises(InputError, match="belongs to another campaign") as error:
         validate(how.pop("robots", ROBOTS), store=tmp_path, **{"samples": SAMPLES, **how})
@@ -141,10 +133,9 @@ def test_a_changed_file_is_not_taken_for_what_it_was_and_another_folder_is_left_
     robot.write_text('<robot name="a"><link name="l"/></robot>')
     old = subject(str(robot))
     robot.write_text('<robot name="b"><link name="l"/></robot>')
-    with pytest.raises(InputError, match="has changed since the validation began"):
-        old.read()
-    with pytest.raises(InputError, match="has changed since the validation began"):
-        old.carried()
+    for ask in (old.read, old.carried):
+        with pytest.raises(InputError, match="has changed since the validation began"):
+            ask()
     assert subject(str(robot)).carried().read().name == "b"
     (tmp_path / "thesis.tex").write_text("")
     with pytest.raises(InputError, match="not empty and is not a store"):
@@ -189,15 +180,10 @@ def result() -> ChunkResult:
 
 def test_an_answer_is_read_back_to_the_last_bit() -> None:
     found = result()
-    tallies = {
-        key: replace(tally, worst=float("inf"), by_frame=(0.1 + 0.2, 5e-324, float("inf")))
-        for key, tally in found.tallies.items()
-    }
-    for each in (
-        found,
-        replace(found, tallies=tallies, portrait=None),
-        Failure(Verdict.BAD_INPUT, "no \ud800"),
-    ):
+    odd: Any = {"worst": float("inf"), "by_frame": (0.1 + 0.2, 5e-324, float("inf"))}
+    tallies = {key: replace(tally, **odd) for key, tally in found.tallies.items()}
+    other = replace(found, tallies=tallies, portrait=None)
+    for each in (found, other, Failure(Verdict.BAD_INPUT, "no \ud800")):
         again = read("k", written("k", each))
         assert json.dumps(_plain(again)) == json.dumps(_plain(each))
 
@@ -249,12 +235,10 @@ def test_no_byte_of_a_chunk_can_be_changed_or_cut_off_unnoticed() -> None:
 def test_a_damaged_store_is_reported_and_made_whole(undisturbed: str, tmp_path: Path) -> None:
     validate(ROBOTS, samples=SAMPLES, store=tmp_path)
     there = files(tmp_path)
-    for i, place in enumerate(there[:4]):
-        content = place.read_bytes()
-        half = len(content) // 2
-        place.write_bytes(
-            [b"", content[:half], content[:half] + b"x" + content[half + 1 :], there[5].read_bytes()][i]
-        )
+    second, third = (place.read_bytes() for place in there[1:3])
+    cut, changed = second[: len(second) // 2], third[: len(third) // 2] + b"x" + third[len(third) // 2 + 1 :]
+    for place, content in zip(there, (b"", cut, changed, there[5].read_bytes()), strict=False):
+        place.write_bytes(content)
     with pytest.warns(StoreWarning, match="is damaged and is computed again: ") as told:
         partly = stored(tmp_path)
     assert len(told) == 4
@@ -307,9 +291,8 @@ def test_a_tampered_manifest_is_refused_with_the_place(entry: str, value: object
     validate("planar_two_link", samples=0, store=tmp_path)
     place = tmp_path / "manifest.json"
     place.write_text(json.dumps(json.loads(place.read_text()) | {entry: value}))
-    with pytest.raises(
-        InputError, match=rf"manifest.json: does not conform .* found \$\.{entry}.*write it again"
-    ):
+    words = rf"manifest.json: does not conform .* found \$\.{entry}.*write it again"
+    with pytest.raises(InputError, match=words):
         stored(tmp_path)
 
 
@@ -407,9 +390,8 @@ def test_neighbours_add_up_in_any_order() -> None:
         for i in order:
             gathering.enter(Task(0, all_chunks[i]), results[i])
         (report,) = gathering.reports()
-        reports.add(
-            json.dumps({k: v for k, v in report.as_dict().items() if k not in ("seconds", "timings")})
-        )
+        data = {k: v for k, v in report.as_dict().items() if k not in ("seconds", "timings")}
+        reports.add(json.dumps(data))
     assert len(reports) == 1
 
 
@@ -419,19 +401,17 @@ _COMMAND = [sys.executable, "-m", "urdfkin", "validate", *ROBOTS, "--samples", s
 
 
 def _run(folder: Path, *words: str, **how: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*_COMMAND, str(folder), *words], capture_output=True, text=True, check=False, **how
-    )
+    command = [*_COMMAND, str(folder), *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False, **how)
 
 
 @pytest.mark.long
 def test_a_client_killed_at_any_time_loses_nothing_that_was_kept(undisturbed: str, tmp_path: Path) -> None:
     """Killed by SIGKILL at random times, again and again, until one gets through."""
     rng, seen = np.random.default_rng(20), 0
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     for _ in range(4):
-        with subprocess.Popen(
-            [*_COMMAND, str(tmp_path / "s")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        ) as process:
+        with subprocess.Popen([*_COMMAND, str(tmp_path / "s")], **quiet) as process:
             deadline = time.monotonic() + 60
             while len(files(tmp_path / "s")) <= seen and process.poll() is None:
                 assert time.monotonic() < deadline
@@ -454,9 +434,8 @@ def test_a_full_disc_is_said_and_what_was_kept_is_gone_on_with(undisturbed: str,
 
     full = _run(tmp_path / "s", preexec_fn=limit)
     assert full.returncode == 3, full.stderr
-    assert "the store cannot be written: found File too large; free some disk space" in " ".join(
-        full.stdout.split()
-    )
+    words = "the store cannot be written: found File too large; free some disk space"
+    assert words in " ".join(full.stdout.split())
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path / "s")) == undisturbed
 
 
@@ -473,9 +452,7 @@ def test_a_second_client_is_refused_and_told_who_is_at_work(tmp_path: Path) -> N
 
 
 @pytest.mark.long
-def test_two_clients_that_begin_at_the_same_time_leave_what_one_would(
-    undisturbed: str, tmp_path: Path
-) -> None:
+def test_two_clients_that_begin_at_one_time_leave_what_one_would(undisturbed: str, tmp_path: Path) -> None:
     how: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
     both = [subprocess.Popen([*_COMMAND, str(tmp_path / "s")], **how) for _ in range(2)]
     said = [process.communicate()[1] for process in both]

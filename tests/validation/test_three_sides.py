@@ -27,8 +27,8 @@ SECOND = Bound(np.full((1, 1, 1), 2.0), np.full((1, 1, 1), 8.0))
 
 
 def asked(ours: float, pinocchios: float, second_oracle: float) -> ThreeSides:
-    one: list[FloatArray] = [np.full((1, 1, 1), 1.0 + x * EPS) for x in (ours, pinocchios, second_oracle)]
-    return three_sides("mujoco", one[0], one[1], one[2], FIRST, SECOND)
+    one, two, three = (np.full((1, 1, 1), 1.0 + x * EPS) for x in (ours, pinocchios, second_oracle))
+    return three_sides("mujoco", one, two, three, FIRST, SECOND)
 
 
 #: Three answers, who stands alone, and how many cases are undecided.
@@ -66,33 +66,23 @@ def test_sums_add_up_in_any_order() -> None:
 @pytest.mark.parametrize(
     ("answers", "agree"),
     [
-        ((0, 4, 4), (True, True, True)),
-        ((0, 5, 4), (False, True, True)),
-        ((0, 4, 16), (True, True, True)),
-        ((0, 4, 17), (True, False, True)),
-        ((0, -4, 16), (True, True, True)),
-        ((0, -4, 17), (True, False, False)),
-        ((0, -5, 16), (False, True, False)),
+        ((0, 4, 4), (True, True, True)), ((0, 5, 4), (False, True, True)), ((0, 4, 16), (True, True, True)),
+        ((0, 4, 17), (True, False, True)), ((0, -4, 16), (True, True, True)),
+        ((0, -4, 17), (True, False, False)), ((0, -5, 16), (False, True, False)),
     ],
-)
+)  # fmt: skip
 def test_two_answers_agree_up_to_their_bound_and_no_further(
     answers: tuple[float, float, float], agree: tuple[bool, bool, bool]
 ) -> None:
     found, (ours, pinocchios, second_oracle) = asked(*answers), answers
-    ours_theirs, ours_second, theirs_second = agree
+    _, ours_second, theirs_second = agree
     assert (found.urdfkin.failed, found.pinocchio.failed) == (not ours_second, not theirs_second)
     assert found.urdfkin.share_of_bound == abs(ours - second_oracle) / 16
     assert found.pinocchio.share_of_bound == abs(pinocchios - second_oracle) / 20
     assert found.urdfkin.worst == abs(ours - second_oracle) / 2
-    others = {
-        (True, True, True): ((0, 0, 0), 0),
-        (True, False, False): ((0, 0, 1), 0),
-        (False, True, False): ((0, 1, 0), 0),
-        (False, False, True): ((1, 0, 0), 0),
-    }
-    assert (found.alone, found.undecided) == others.get(
-        (ours_theirs, ours_second, theirs_second), ((0, 0, 0), 1)
-    )
+    # If two of the three agree, and no others, the third stands alone.
+    assert found.alone == (agree[::-1] if sum(agree) == 1 else (0, 0, 0))
+    assert found.undecided == (sum(agree) in (0, 2))
 
 
 def test_of_several_blocks_the_worst_disagreement_is_kept() -> None:
@@ -131,10 +121,6 @@ def test_each_pair_is_measured_against_its_own_bound(monkeypatch: pytest.MonkeyP
         assert np.array_equal(second.k, 2.0 * 30.0 / 24.0 * bound.k)
 
 
-def off(method: Any) -> Any:
-    return lambda *given: method(*given) + 1e-6
-
-
 @pytest.mark.slow
 def test_three_that_agree_are_told_side_by_side_in_every_form() -> None:
     document = document_of()
@@ -144,24 +130,21 @@ def test_three_that_agree_are_told_side_by_side_in_every_form() -> None:
     assert "--oracle mujoco" in (document["command"] or "")
     second_oracle_rows = [check for check in robot["checks"] if "second_oracle" in check]
     assert {check["subjects"] for check in second_oracle_rows} == {"frames", "joints"}
-    assert {check["quantity"] for check in robot["checks"]} - {
-        check["quantity"] for check in second_oracle_rows
-    } == {
-        "screws"  # Pinocchio's own data.J
-    }
+    every, some = ({check["quantity"] for check in rows} for rows in (robot["checks"], second_oracle_rows))
+    assert every - some == {"screws"}  # Pinocchio's own data.J
     for text in (as_markdown(document), as_html(document), as_junit(document).decode()):
         assert "urdfkin, MuJoCo" in text
         assert "outlier" in text
         assert "none" in text
 
 
-@pytest.mark.parametrize(
-    ("oracle", "who"), [(PinocchioOracle, "Pinocchio"), (MujocoOracle, "MuJoCo")], ids=["Pinocchio", "MuJoCo"]
-)
-def test_one_that_errs_stands_alone_in_the_report(
-    oracle: type, who: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(oracle, "velocities", off(oracle.velocities))  # type: ignore[attr-defined]
+ORACLES: dict[str, Any] = {"Pinocchio": PinocchioOracle, "MuJoCo": MujocoOracle}
+
+
+@pytest.mark.parametrize("who", ORACLES)
+def test_one_that_errs_stands_alone_in_the_report(who: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = ORACLES[who].velocities
+    monkeypatch.setattr(ORACLES[who], "velocities", lambda *given: right(*given) + 1e-6)
     document = document_of()
     robot = document["robots"][0]
     assert robot["verdict"] == "disagrees"

@@ -5,7 +5,6 @@ docs/vectors.md. Both share no code with urdfkin.
 """
 
 import hashlib
-import importlib.util
 import json
 import os
 import shutil
@@ -22,9 +21,12 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests import urdfs
 from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
+from tests.reading import module_of
 from tests.urdf_standard import Robot, mp
+from tests.urdfs import joint, limit, mimic
 from urdfkin.system.resources import example_robots_dir, robots_dir
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.vectors import VECTORS, features, stem, write_features, write_robot, write_sums
@@ -44,17 +46,7 @@ SOME = (
 )  # fmt: skip
 
 
-def _reader() -> Callable[..., Iterator[str]]:
-    spec = importlib.util.spec_from_file_location("compare", EXAMPLES / "compare.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    found: Callable[..., Iterator[str]] = module.wrong
-    return found
-
-
-wrong = _reader()
+wrong: Callable[..., Iterator[str]] = module_of(EXAMPLES / "compare.py").wrong
 
 
 @pytest.fixture(scope="module")
@@ -87,16 +79,9 @@ def agree(path: Path) -> int:
         inputs = {name: list(map(float, sample[name])) for name in "qva"}
         for link in {one["frame"] for one in sample["results"]}:
             expected = second.quantities(link, inputs, joints)
-            for one in sample["results"]:
-                if one["frame"] != link:
-                    continue
-                unit = mp.mpf(one["k"]) * EPS
-                for x, text, tolerance in zip(
-                    expected.pop((one["quantity"], one["reference"])),
-                    one["value"],
-                    one["tolerance"],
-                    strict=True,
-                ):
+            for one in (one for one in sample["results"] if one["frame"] == link):
+                unit, values = mp.mpf(one["k"]) * EPS, expected.pop((one["quantity"], one["reference"]))
+                for x, text, tolerance in zip(values, one["value"], one["tolerance"], strict=True):
                     count += 1
                     if x == 0 and text == "0":
                         continue
@@ -120,9 +105,7 @@ def test_an_implementation_written_from_the_standard_agrees_with_all_features(fo
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", catalogue())
-def test_an_implementation_written_from_the_standard_agrees_for_the_catalogue(
-    name: str, tmp_path: Path
-) -> None:
+def test_an_implementation_written_from_the_standard_agrees_for_catalogue(name: str, tmp_path: Path) -> None:
     assert run("vectors write", str(tmp_path), name, "--samples", "2").code == 0
     assert agree(tmp_path / f"{name}.json") > 0
 
@@ -134,10 +117,8 @@ def own(robot: urdfkin.Robot) -> Callable[..., Any]:
         if quantity == "placement":
             return robot.placement(q, frame)
         if quantity != "spatial acceleration":
-            inputs = {"velocity": (q, v), "jacobian rate": (q, v), "acceleration": (q, v, a)}.get(
-                quantity, (q,)
-            )
-            return robot.compute(quantity, inputs, frame, reference)
+            taken = {"velocity": 2, "jacobian rate": 2, "acceleration": 3}.get(quantity, 1)
+            return robot.compute(quantity, (q, v, a)[:taken], frame, reference)
         R, p = robot.placement(q, frame)[:3, :3], robot.placement(q, frame)[:3, 3]
         velocity, found = robot.velocity(q, v, frame), robot.acceleration(q, v, a, frame)
         linear, angular = found[:3] - np.cross(velocity[3:], velocity[:3]), found[3:]
@@ -170,9 +151,8 @@ class Sizes:
     def __init__(self, robot: Robot, link: str, sample: Mapping[str, Any], joints: Sequence[Any]) -> None:
         self.robot, self.path = robot, robot.path(link)
         at = {one["name"]: one for one in joints}
-        self.columns: list[
-            tuple[int, float, bool, int]
-        ] = []  # place, |m|, turns, place of the joint on the path
+        #: Place, |m|, whether it turns, place of the joint on the path.
+        self.columns = list[tuple[int, float, bool, int]]()
         self.p = self.w = self.u = self.d = self.c = e = 0.0
         rules = 0
         for order, name in enumerate(self.path):
@@ -184,10 +164,8 @@ class Sizes:
             rules += count
             turns = joint.kind in ("revolute", "continuous")
             e += error + (count - 1) / 2 * X if turns and count else 0.0
-            q, v, a = (
-                sample[key][slice(*at[leader]["q" if key == "q" else "v"])] if leader in at else []
-                for key in "qva"
-            )
+            own = at.get(leader, {"q": (0, 0), "v": (0, 0)})
+            q, v, a = (sample[key][slice(*own["q" if key == "q" else "v"])] for key in "qva")
             L = float(np.linalg.norm(joint.origin[:3, 3].astype(float)))
             if joint.kind == "prismatic":
                 L += X
@@ -207,9 +185,7 @@ class Sizes:
                 self.u += s
             elif joint.kind in ("planar", "floating"):
                 k = 2 if joint.kind == "planar" else 3
-                slide, turn, slide_2, turn_2 = (
-                    float(np.linalg.norm(x)) for x in (v[:k], v[k:], a[:k], a[k:])
-                )
+                slide, turn, slide_2, turn_2 = map(float, map(np.linalg.norm, (v[:k], v[k:], a[:k], a[k:])))
                 self.c += (2 * self.w + turn) * slide + slide_2
                 self.w += turn
                 self.u += slide
@@ -259,11 +235,9 @@ class Sizes:
         for of, m_i, turns_i, i in self.columns:
             for by, m_j, turns_j, j in self.columns:
                 before = j <= i
-                f, g = near if before else far
-                size = m_i * m_j
-                sizes[0, of, by] += size * (
-                    f * self.p if turns_i and turns_j else g if turns_i != turns_j else 0
-                )
+                (f, g), size = near if before else far, m_i * m_j
+                factor = f * self.p if turns_i and turns_j else g if turns_i != turns_j else 0
+                sizes[0, of, by] += size * factor
                 sizes[1, of, by] += size * (turns_i and turns_j and before != local)
         return np.repeat(sizes, 3, axis=0).ravel()
 
@@ -293,37 +267,32 @@ def chained(rng: np.random.Generator, large: bool) -> str:
 
     The offsets cancel or, if `large`, the last one is a little above a power of two and rounds the most.
     """
-    constant, parts, count = Decimal(0), ['<robot name="r"><link name="l0"/>'], int(rng.integers(3, 6))
+    constant, parts, count = Decimal(0), list[str](), int(rng.integers(3, 6))
     for k in range(count):
         rule = ""
         if k:
-            m = Decimal(f"{10 ** rng.uniform(-1 if large else -2, 0 if large else 2):.3f}") * rng.choice(
-                [-1, 1]
-            )
+            m = Decimal(f"{10 ** rng.uniform(-1 if large else -2, 0 if large else 2):.3f}")
+            m *= rng.choice([-1, 1])
             c = Decimal(f"{10 ** rng.uniform(0, 4):.3f}")
             if large:
                 c = Decimal(f"{2**16 + rng.uniform(0, 60):.6f}" if k == count - 1 else "0.3")
             elif k > 1 and rng.random() < 0.7:
                 c = round(-m * constant, int(rng.integers(2, 7)))
             constant = m * constant + c
-            rule = f'<mimic joint="j{k - 1}" multiplier="{m}" offset="{c}"/>'
+            rule = mimic(f"j{k - 1}", m, c)
         most = "1e12" if k else "2"
         kind = "revolute" if large else rng.choice(["prismatic", "revolute"])
-        parts.append(
-            f'<link name="l{k + 1}"/><joint name="j{k}" type="{kind}">'
-            f'<parent link="l{k}"/><child link="l{k + 1}"/>'
-            f'<origin xyz="0.1 0.2 0" rpy="0 {rng.uniform(-3, 3):.3f} 0"/>'
-            f'<axis xyz="{" ".join(map(str, rng.permutation([1, 0, 0])))}"/>{rule}'
-            f'<limit lower="-{most}" upper="{most}" velocity="1" effort="1"/></joint>'
-        )
-    return "".join(parts) + "</robot>"
+        origin = f'xyz="0.1 0.2 0" rpy="0 {rng.uniform(-3, 3):.3f} 0"'
+        axis = " ".join(map(str, rng.permutation([1, 0, 0])))
+        parts.append(joint(f"j{k}", kind, f"l{k}", f"l{k + 1}", origin, axis, rule + limit(f"-{most}", most)))
+    return urdfs.robot(*parts)
 
 
 def one_by_one(text: str) -> Callable[..., Any]:
     """Return the placements of a program that applies the mimic rules one after the other, in doubles."""
     free = urdfkin.load(text, verify=False, mimic=False)
     rules = [
-        (float(rule.get("multiplier", "")), float(rule.get("offset", "")))
+        tuple(float(rule.get(name, "")) for name in ("multiplier", "offset"))
         for rule in ET.fromstring(text).iterfind("joint/mimic")
     ]
 
@@ -380,9 +349,7 @@ def in_turn(rows: Sequence[Sequence[float]]) -> Callable[..., Any]:
 
 
 @pytest.mark.parametrize("which", [0, 3, 7, 16, 41])
-def test_the_reader_in_python_finds_every_number_changed_by_a_billionth_of_its_size(
-    which: int, folder: Path
-) -> None:
+def test_the_reader_in_python_finds_every_number_changed_by_a_billionth(which: int, folder: Path) -> None:
     kinds = set()
     for path in folder.glob("*.json"):
         data = document(path)
@@ -422,7 +389,7 @@ def compared(program: Path, *files: Path) -> tuple[int, str]:
 @pytest.mark.parametrize(
     "name", ["mimic of a mimic", "floating", "origin of a nanometre", "names beyond ASCII"]
 )
-def test_the_reader_in_cpp_finds_every_number_changed_by_a_billionth_of_its_size(
+def test_the_reader_in_cpp_finds_every_number_changed_by_a_billionth(
     name: str, program: Path, folder: Path, tmp_path: Path
 ) -> None:
     vectors, answers = folder / f"{stem(name)}.tsv", tmp_path / "answers.tsv"
@@ -478,9 +445,7 @@ def test_both_forms_have_the_same_numbers_and_conform_to_the_schema(folder: Path
         assert [[float(x) for x in row[4].split()] for row in rows if row[1] == "-"] == inputs
 
 
-def test_the_files_are_the_same_in_another_process_with_another_hash_seed(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_files_are_the_same_in_another_process_with_another_hash_seed(folder: Path, tmp_path: Path) -> None:
     command = "from urdfkin.cli import main; main()"
     subprocess.run(
         [sys.executable, "-c", command, "vectors", "write", str(tmp_path), "--no-catalogue"],
@@ -499,9 +464,7 @@ def test_all_files_with_the_catalogue_are_written_twice_the_same(tmp_path: Path)
     assert (first / "SHA256SUMS").read_bytes() == (second / "SHA256SUMS").read_bytes()
     found = [document(path) for path in first.glob("*.json")]
     assert len(found) == len(features()) + len(catalogue())
-    for data in found:
-        for one in data["samples"][1]["results"]:
-            assert one["k"] * EPS < 1e-10
+    assert all(one["k"] * EPS < 1e-10 for data in found for one in data["samples"][1]["results"])
 
 
 def test_the_features_are_many_have_names_of_their_own_and_notes_on_libraries_that_differ() -> None:
@@ -526,9 +489,7 @@ def test_the_features_are_many_have_names_of_their_own_and_notes_on_libraries_th
 # -- the command ----------------------------------------------------------------------------------------
 
 
-def test_a_robot_of_the_catalogue_is_written_by_reference_and_another_one_with_its_file(
-    tmp_path: Path,
-) -> None:
+def test_a_robot_of_the_catalogue_is_written_by_reference_and_others_with_a_file(tmp_path: Path) -> None:
     text = urdfkin.load("planar_two_link").urdf
     (tmp_path / "mine.urdf").write_text(text.replace('"planar_two_link"', '"my arm"'))
     done = good(

@@ -14,6 +14,7 @@ import pytest
 
 from tests.attacks.test_validation_signals import children
 from tests.validation import canned_worker
+from tests.validation.test_store import numbers
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation import answer, engines, memory, worker_processes
 from urdfkin.validation.answer import Answer
@@ -24,8 +25,8 @@ from urdfkin.validation.engines import Row, Task, WorkQueue
 from urdfkin.validation.outcome import Verdict
 from urdfkin.validation.robot_input import RobotInput
 
-DEADLY = "ur5"
-ROBOTS = ["double_pendulum", DEADLY, "iris_simple"]
+ROBOTS = ["double_pendulum", "ur5", "iris_simple"]
+DIED = "ur5: the process that validated the robot {}: found signal SIGSEGV"
 HOW: list[dict[str, Any]] = [{"jobs": 2}, {"jobs": 2, "isolate": True}, {"isolate": True}]
 
 
@@ -38,13 +39,6 @@ def deaths(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return path
 
 
-def numbers(report: Any) -> Any:
-    return [
-        {key: value for key, value in robot.items() if key not in ("seconds", "timings")}
-        for robot in report.as_dict()["robots"]
-    ]
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("how", HOW, ids=str)
 def test_processes_change_no_number(how: dict[str, Any]) -> None:
@@ -55,26 +49,14 @@ def test_processes_change_no_number(how: dict[str, Any]) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("how", "words"),
-    [
-        (HOW[0], "crashed twice; the second process computed nothing else"),
-        (HOW[1], "crashed"),
-        (HOW[2], "crashed"),
-    ],
-)
-def test_a_death_is_that_robots_result_and_the_others_go_on(
-    how: dict[str, Any], words: str, deaths: Path
-) -> None:
+@pytest.mark.parametrize("how", HOW)
+def test_a_death_is_that_robots_result_and_the_others_go_on(how: dict[str, Any], deaths: Path) -> None:
     deaths.write_text("99")
     report = validate(ROBOTS, samples=60, **how)
-    assert [robot.verdict for robot in report.robots] == [
-        Verdict.VERIFIED,
-        Verdict.NOT_VERIFIED,
-        Verdict.VERIFIED,
-    ]
-    reason = f"ur5: the process that validated the robot {words}: found signal SIGSEGV"
-    assert report.robots[1].reason == reason
+    verdicts = [Verdict.VERIFIED, Verdict.NOT_VERIFIED, Verdict.VERIFIED]
+    assert [robot.verdict for robot in report.robots] == verdicts
+    twice = "crashed twice; the second process computed nothing else"
+    assert report.robots[1].reason == DIED.format("crashed" if "isolate" in how else twice)
     assert not report.passed
     assert report.exit_code == 3
 
@@ -136,9 +118,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
 
 
 @pytest.mark.long
-def test_what_does_not_start_any_more_is_done_by_those_that_are_there(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_does_not_start_any_more_is_done_by_those_that_are_up(monkeypatch: pytest.MonkeyPatch) -> None:
     right, asked = worker_processes._interpreter, 0
 
     def one(pipe: int) -> Any:
@@ -176,9 +156,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.long
-def test_workers_killed_at_random_times_change_no_number(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_workers_killed_at_any_time_change_no_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Twenty seeds: when, which of two, and how often; real processes, whose answers are known beforehand."""
     robots, right = ["planar_two_link", "double_pendulum", "<robot/>", "iris_simple"], answer.answer
 

@@ -1,5 +1,7 @@
 """The bounds, number for number, as derived, and the sizes of terms."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -38,16 +40,8 @@ def plan() -> CompiledTree:
     return urdfkin.load(ARM).plan([3])
 
 
-def six(bound: Bound) -> tuple[float, float, float]:
-    """Linear and angular scale, each the same for three numbers, and k."""
-    linear, angular = np.split(bound.scale[0, 0], 2, axis=0)
-    assert (linear == linear[0]).all()
-    assert (angular == angular[0]).all()
-    return float(linear[0]), float(angular[0]), float(bound.k.ravel()[0])
-
-
-def columns(bound: Bound) -> tuple[FloatArray, FloatArray, float]:
-    """The scales of the linear and of the angular rows, one number a column, and k."""
+def columns(bound: Bound) -> tuple[Any, Any, float]:
+    """The scales of the linear and of the angular rows, each the same in three rows, and k."""
     scale = bound.scale[0, 0]
     assert (scale[:3] == scale[0]).all()
     assert (scale[3:] == scale[3]).all()
@@ -67,21 +61,18 @@ def test_a_placement_is_held_to_the_path_and_its_rotation_to_one(plan: CompiledT
 def test_a_velocity_has_two_factors(
     plan: CompiledTree, reference: Reference, linear: float, factors: int
 ) -> None:
-    assert six(VELOCITY.bound(plan, sizes(), reference)) == (linear, W, 24.0 * JOINTS * factors)
+    assert columns(VELOCITY.bound(plan, sizes(), reference)) == (linear, W, 24.0 * JOINTS * factors)
 
 
 @pytest.mark.parametrize(
     ("reference", "linear", "factors"),
-    [
-        (ALIGNED, ACC + W * VEL, 3),
-        (LOCAL, ACC + W * VEL, 4),
-        (WORLD, ACC + 2 * W * VEL + (ALPHA + W * W) * P, 4),
-    ],
-)
+    [(ALIGNED, ACC + W * VEL, 3), (LOCAL, ACC + W * VEL, 4),
+     (WORLD, ACC + 2 * W * VEL + (ALPHA + W * W) * P, 4)],
+)  # fmt: skip
 def test_an_acceleration_has_three(
     plan: CompiledTree, reference: Reference, linear: float, factors: int
 ) -> None:
-    assert six(ACCELERATION.bound(plan, sizes(), reference)) == (linear, ALPHA, 24.0 * JOINTS * factors)
+    assert columns(ACCELERATION.bound(plan, sizes(), reference)) == (linear, ALPHA, 24.0 * JOINTS * factors)
 
 
 @pytest.mark.parametrize(("reference", "factors"), [(ALIGNED, 2), (LOCAL, 3), (WORLD, 3)])
@@ -128,10 +119,7 @@ def test_an_imus_reading_is_held_to_that_scale_and_to_an_accelerations_factors()
     _, bound = derived.check_imu(robot.verifier.oracle(), part, np.zeros((1, 1, 6)), PINOCCHIO)
     v, a = part.rates
     size = magnitudes(part.plan, part.q, v, a, part.state)
-    linear, angular, k = six(bound)
-    assert linear == size.acc[0, 0] + size.w[0, 0] * size.vel[0, 0] + 5.0
-    assert angular == size.w[0, 0]
-    assert k == 24.0 * JOINTS * 4
+    assert columns(bound) == (size.acc + size.w * size.vel + 5.0, size.w, 24.0 * JOINTS * 4)
 
 
 def test_a_relative_placement_is_held_to_both_paths() -> None:
@@ -171,30 +159,24 @@ def test_which_columns_can_be_anything_but_0_is_the_robots(
 
 
 def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity(plan: CompiledTree) -> None:
-    def euler(apart: float) -> Bound:
+    def euler(apart: float) -> FloatArray:
         jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)
-        return bounds.euler_jacobian_bound(jacobian, sizes(), np.array([[apart]]))
+        return np.asarray(bounds.euler_jacobian_bound(jacobian, sizes(), np.array([[apart]])).scale[0, 0])
 
     delta = EPS * 24.0 * JOINTS
     for apart in (1.0, 1e-3, 1e-6):
-        scale = bounds.euler_jacobian_bound(
-            JACOBIAN.bound(plan, sizes(), ALIGNED), sizes(), np.array([[apart]])
-        ).scale[0, 0]
-        s = apart - delta
+        scale, s = euler(apart), apart - delta
         assert (scale[:3] == [P, 3.0]).all()
         assert scale[[3, 5], 0] == pytest.approx(1.5 / s**2, rel=1e-15)
         assert scale[4, 0] == pytest.approx(1.0 / s, rel=1e-15)
         assert (scale[3:, 1] == 0.0).all()
-    hidden = euler(delta)
-    assert not np.isfinite(hidden.scale[0, 0, 3:, 0]).any()
+    assert not np.isfinite(euler(delta)[3:, 0]).any()
     assert bounds.nearest_singularity(plan) == 4.0 * delta
 
 
 def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: CompiledTree) -> None:
-    bound, jacobian = (
-        bounds.quaternion_jacobian_bound(JACOBIAN.bound(plan, sizes(), ALIGNED)),
-        JACOBIAN.bound(plan, sizes(), ALIGNED),
-    )
+    jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)
+    bound = bounds.quaternion_jacobian_bound(JACOBIAN.bound(plan, sizes(), ALIGNED))
     assert (bound.scale[0, 0, :6] == jacobian.scale[0, 0]).all()
     assert (bound.scale[0, 0, 6] == jacobian.scale[0, 0, 5]).all()
     assert (bound.k == jacobian.k).all()
@@ -203,7 +185,7 @@ def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: CompiledT
 def test_a_tilt_adds_twice_itself_to_each_factor(plan: CompiledTree) -> None:
     tilt = 1e-13
     k = 24.0 * JOINTS + 2.0 * tilt / EPS
-    assert six(VELOCITY.bound(plan, sizes(tilt), LOCAL))[2] == 3.0 * k
+    assert columns(VELOCITY.bound(plan, sizes(tilt), LOCAL))[2] == 3.0 * k
     assert columns(JACOBIAN.bound(plan, sizes(tilt), ALIGNED))[2] == 2.0 * k
 
 
@@ -212,15 +194,13 @@ def test_mujocos_levers_are_twice_as_long_and_its_roundings_two_and_a_half_times
     lever = 2.0 * P
     assert size.p == lever
     assert size.w == W
-    assert size.vel == VEL + W * lever
     assert size.alpha == ALPHA
+    assert size.vel == VEL + W * lever
     assert size.acc == ACC + W * VEL + (ALPHA + W * W) * lever
     assert size.roundings == 2.0 * 30.0 * JOINTS
 
 
-def test_an_imus_reading_has_an_accelerations_factors_in_its_own_axes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_imus_reading_has_an_accelerations_factors_in_own_axes(monkeypatch: pytest.MonkeyPatch) -> None:
     found: list[tuple[FloatArray, int, Magnitudes, Reference]] = []
 
     def asked(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference) -> Bound:
@@ -245,12 +225,9 @@ LONG_ARM = urdfs.robot(
 )
 
 
-def length(x: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.norm(x, axis=-1))
-
-
-def exceed(found: FloatArray, size: FloatArray) -> bool:
-    return bool((found > size * (1.0 + 100.0 * EPS) + 100.0 * EPS * (size > 0.0)).any())
+def exceed(vectors: FloatArray, size: FloatArray) -> bool:
+    lengths = np.linalg.norm(vectors, axis=-1)
+    return bool((lengths > size * (1.0 + 100.0 * EPS) + 100.0 * EPS * (size > 0.0)).any())
 
 
 @pytest.mark.slow
@@ -267,11 +244,11 @@ def test_nothing_exceeds_its_size(subject: str, sizes: tuple[float, float], movi
     plan = robot.plan(range(len(robot.link_names)))
     size = magnitudes(plan, q, v, a, base)
     vel, acc = velocities(plan, q, v, base=base), accelerations(plan, q, v, a, base=base)
-    assert not exceed(length(placements(plan, q, base=base)[..., :3, 3]), size.p)
-    assert not exceed(length(vel[..., :3]), size.vel)
-    assert not exceed(length(vel[..., 3:]), size.w)
-    assert not exceed(length(acc[..., :3]), size.acc)
-    assert not exceed(length(acc[..., 3:]), size.alpha)
+    assert not exceed(placements(plan, q, base=base)[..., :3, 3], size.p)
+    assert not exceed(vel[..., :3], size.vel)
+    assert not exceed(vel[..., 3:], size.w)
+    assert not exceed(acc[..., :3], size.acc)
+    assert not exceed(acc[..., 3:], size.alpha)
     places = magnitudes(plan, q, None, None, base)
     assert (places.p == size.p).all()
     assert (places.roundings == size.roundings).all()

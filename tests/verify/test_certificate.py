@@ -74,8 +74,7 @@ def test_each_way_of_asking_is_counted(robot: Robot) -> None:
     robot.placement(one[0], [FRAME, "panda_link2"], verify=True)
     robot.placement(np.repeat(q, 7, axis=0), FRAME)
     fast.placement(np.repeat(q, 5, axis=0))
-    links = len(robot.link_names)
-    assert counts(robot)["placement"] == (1 + 2, 3 + 1 + links + 7 + 5)
+    assert counts(robot)["placement"] == (1 + 2, 3 + 1 + len(robot.link_names) + 7 + 5)
     robot.velocity(one[0], np.repeat(v, 4, axis=0), FRAME)
     assert counts(robot)["velocity"] == (0, 3 + 4)
     assert robot.certificate().not_verified == (NOT_ASKED_FOR,)
@@ -86,15 +85,11 @@ def test_what_was_refused_is_not_counted(robot: Robot) -> None:
     bad = np.full(robot.nq, np.nan)
     fast = robot.prepare(FRAME)
     calls: list[Callable[[], object]] = [
-        lambda: fast.placement(bad),
-        lambda: fast.velocity(q, bad),
-        lambda: fast.jacobian(q[:3]),
-        lambda: fast.jacobian(q, out=np.zeros((6, 9))),
-        lambda: fast.acceleration(q, q, bad),
-        lambda: robot.jacobian(bad, FRAME),
-        lambda: robot.placement(bad, robot.link_frames),
+        lambda: fast.placement(bad), lambda: fast.velocity(q, bad), lambda: fast.jacobian(q[:3]),
+        lambda: fast.jacobian(q, out=np.zeros((6, 9))), lambda: fast.acceleration(q, q, bad),
+        lambda: robot.jacobian(bad, FRAME), lambda: robot.placement(bad, robot.link_frames),
         lambda: robot.velocity(q, q, FRAME, out=q),
-    ]
+    ]  # fmt: skip
     for compute in calls:
         with pytest.raises(InputError):
             compute()

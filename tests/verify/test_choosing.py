@@ -31,19 +31,21 @@ def calls(
     robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None, verify: Verify
 ) -> dict[str, Callable[[], FloatArray]]:
     """One call for each quantity; two of them are of several frames."""
-    asked = {"base": base, "verify": verify}
+    asked: dict[str, Any] = {"base": base, "verify": verify}
     return {
-        "placement": lambda: robot.placement(q, FRAMES, **asked),  # type: ignore[arg-type]
-        "velocity": lambda: robot.velocity(q, v, FRAMES[0], "local", **asked),  # type: ignore[arg-type]
-        "jacobian": lambda: robot.jacobian(q, FRAMES[0], "world", **asked),  # type: ignore[arg-type]
-        "jacobian rate": lambda: robot.jacobian_rate(q, v, FRAMES[0], **asked),  # type: ignore[arg-type]
-        "hessian": lambda: robot.hessian(q, FRAMES[0], "local", **asked),  # type: ignore[arg-type]
-        "acceleration": lambda: robot.acceleration(q, v, a, FRAMES, "world", **asked),  # type: ignore[arg-type]
+        "placement": lambda: robot.placement(q, FRAMES, **asked),
+        "velocity": lambda: robot.velocity(q, v, FRAMES[0], "local", **asked),
+        "jacobian": lambda: robot.jacobian(q, FRAMES[0], "world", **asked),
+        "jacobian rate": lambda: robot.jacobian_rate(q, v, FRAMES[0], **asked),
+        "hessian": lambda: robot.hessian(q, FRAMES[0], "local", **asked),
+        "acceleration": lambda: robot.acceleration(q, v, a, FRAMES, "world", **asked),
     }
 
 
-def moving(shape: tuple[int, ...]) -> BaseMotion:
-    """A base that moves, and elsewhere in each configuration."""
+def moving(shape: tuple[int, ...] | None) -> BaseMotion | None:
+    """A base that moves, and elsewhere in each configuration, unless there is none."""
+    if shape is None:
+        return None
     generator = np.random.default_rng(8)
     T = np.broadcast_to(np.eye(4), (*shape, 4, 4)).copy()
     T[..., :3, 3] = generator.standard_normal((*shape, 3))
@@ -51,8 +53,7 @@ def moving(shape: tuple[int, ...]) -> BaseMotion:
 
 
 def batch(robot: Robot, shape: tuple[int, ...]) -> list[FloatArray]:
-    n = int(np.prod(shape))
-    return [x.reshape(*shape, -1) for x in state(robot, n, 4)]
+    return [x.reshape(*shape, -1) for x in state(robot, int(np.prod(shape)), 4)]
 
 
 @pytest.fixture(scope="module")
@@ -90,16 +91,9 @@ def lies(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 BATCHES = [
-    ((), None),
-    ((), ()),
-    ((23,), None),
-    ((23,), ()),
-    ((23,), (23,)),
-    ((2, 11), None),
-    ((2, 11), ()),
-    ((2, 11), (2, 11)),
-    ((2, 11), (11,)),
-]
+    ((), None), ((), ()), ((23,), None), ((23,), ()), ((23,), (23,)), ((2, 11), None), ((2, 11), ()),
+    ((2, 11), (2, 11)), ((2, 11), (11,)),
+]  # fmt: skip
 
 
 @pytest.mark.slow
@@ -109,8 +103,7 @@ def test_the_worst_sample_is_named_in_whatever_part_it_stands(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], base: tuple[int, ...] | None
 ) -> None:
     q, v, a = batch(fresh, shape)
-    first, last = tuple(0 for _ in shape), tuple(size - 1 for size in shape)
-    motion = None if base is None else moving(base)
+    first, last, motion = tuple(0 for _ in shape), tuple(size - 1 for size in shape), moving(base)
     for worst, other in ((first, last), (last, first)):
         q[..., 7] = 0.0
         q[(*other, 7)] = MARK
@@ -134,19 +127,17 @@ def test_the_worst_sample_is_named_in_whatever_part_it_stands(
 def test_the_certificate_does_not_depend_on_the_parts(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], base: tuple[int, ...] | None
 ) -> None:
-    motion = None if base is None else moving(base)
     found = list[Certificate]()
     q, v, a = batch(fresh, shape)
     for size in SIZES:
         monkeypatch.setattr(verifier, "_AT_A_TIME", size)
         fresh.verifier.ledger = type(fresh.verifier.ledger)()
-        for compute in calls(fresh, q, v, a, motion, True).values():
+        for compute in calls(fresh, q, v, a, moving(base), True).values():
             compute()
         found.append(fresh.certificate())
     assert found[0] == found[1] == found[2]
-    n = int(np.prod(shape))
+    n, counts = int(np.prod(shape)), {line.quantity: line.checked for line in found[0].lines}
     several = ("placement", "acceleration")
-    counts = {line.quantity: line.checked for line in found[0].lines}
     assert counts == {quantity: n * (3 if quantity in several else 1) for quantity in counts}
     assert len(counts) == 6
     assert found[0].verified
@@ -185,14 +176,12 @@ def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, size: int, base: tuple[int, ...] | None
 ) -> None:
     monkeypatch.setattr(verifier, "_AT_A_TIME", size)
-    motion = None if base is None else moving(base)
     q, v, a = batch(fresh, (250,))
-    for compute in calls(fresh, q, v, a, motion, "sample").values():
+    for compute in calls(fresh, q, v, a, moving(base), "sample").values():
         compute()
     certificate = fresh.certificate()
-    frames = {"placement": 3, "acceleration": 3}
     for line in certificate.lines:
-        of = frames.get(line.quantity, 1)
+        of = {"placement": 3, "acceleration": 3}.get(line.quantity, 1)
         assert (line.checked, line.unchecked) == (SAMPLE * of, (250 - SAMPLE) * of)
         assert line.worst > 0.0
         assert 0.0 < line.share < 1.0
@@ -214,11 +203,10 @@ def test_a_sample_of_no_more_than_its_size_is_everything(fresh: Robot, n: int) -
 @pytest.mark.parametrize("numbers", [1, 6, 48, 10**7])
 def test_the_sample_is_always_the_same_each_once_and_from_all_of_the_batch(n: int, numbers: int) -> None:
     drawn, again = (
-        np.concatenate([np.arange(n)[part] for part in parts("sample", n, numbers)]) for _ in range(2)
+        [i for part in parts("sample", n, numbers) for i in np.arange(n)[part].tolist()] for _ in range(2)
     )
-    assert drawn.tolist() == again.tolist()
-    assert len(set(drawn.tolist())) == SAMPLE
-    assert drawn.tolist() == sorted(drawn.tolist())
+    assert drawn == again == sorted(drawn)
+    assert len(set(drawn)) == SAMPLE
     assert drawn[0] < n // 10
     assert drawn[-1] >= n - n // 10
 
@@ -266,12 +254,13 @@ def test_a_robot_may_be_loaded_to_check_samples_and_a_call_ask_for_more_or_less(
 
 
 @pytest.mark.parametrize("verify", ["sampled", "", "True", 1, 0, None, np.True_, np.ones(2), ["sample"]])
-def test_what_is_no_choice_is_refused(fresh: Robot, verify: object) -> None:
-    with pytest.raises(InputError, match='verify must be True, False or "sample"'):
-        urdfkin.load("ur5", verify=verify)  # type: ignore[arg-type]
+def test_what_is_no_choice_is_refused(fresh: Robot, verify: Any) -> None:
+    refused = pytest.raises(InputError, match='verify must be True, False or "sample"')
+    with refused:
+        urdfkin.load("ur5", verify=verify)
     if verify is not None:
-        with pytest.raises(InputError, match='verify must be True, False or "sample"'):
-            fresh.jacobian(fresh.neutral(), "panda_hand", verify=verify)  # type: ignore[arg-type]
+        with refused:
+            fresh.jacobian(fresh.neutral(), "panda_hand", verify=verify)
     assert fresh.certificate().lines == ()
 
 
@@ -282,7 +271,6 @@ def test_an_oracle_that_returns_results_of_too_few_or_too_many_configurations_is
     robot = urdfkin.load("planar_two_link")
     q, right = robot.sample(5), verifier.oracle_results
     rows = np.arange(count) % 5
-
     monkeypatch.setattr(verifier, "oracle_results", lambda *asked: right(*asked)[rows])
     monkeypatch.setattr(verifier, "oracle_blocks", lambda *asked: iter([right(*asked)[rows]]))
     for compute in (robot.placement, robot.jacobian):

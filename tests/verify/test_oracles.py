@@ -16,7 +16,7 @@ import pytest
 import urdfkin
 from scripts.fuzzing import robots
 from tests import urdfs
-from tests.cli.running import Done, process
+from tests.cli.running import process
 from tests.urdf.lint.cases.arm import arm, fixed
 from tests.urdfs import joint, loaded, mimic
 from urdfkin.errors import InstallationError, UnknownNameError
@@ -30,15 +30,12 @@ from urdfkin.verify.pinocchio import pinocchio, version
 from urdfkin.verify.second_reader import SecondReading, second_reading
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: As PyPI's project `pinocchio` has it: plugins for nose.
-IMPOSTOR = '__version__ = "0.1"\n'
-
 
 @pytest.fixture
 def impostor(tmp_path: Path) -> str:
-    """A folder that Python searches first, with the other project installed in it."""
+    """A folder that Python searches first, with PyPI's project `pinocchio` in it: plugins for nose."""
     (tmp_path / "pinocchio").mkdir()
-    (tmp_path / "pinocchio" / "__init__.py").write_text(IMPOSTOR)
+    (tmp_path / "pinocchio" / "__init__.py").write_text('__version__ = "0.1"\n')
     about = tmp_path / "pinocchio-0.5.1.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: pinocchio\nVersion: 0.5.1\n")
@@ -46,16 +43,12 @@ def impostor(tmp_path: Path) -> str:
     return str(tmp_path)
 
 
-def misled(where: str, *words: str) -> Done:
-    return process(*words, PYTHONPATH=where)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "words", ["jacobian elbow --q random", "validate elbow --samples 1", "dh elbow", "--version"]
 )
 def test_another_project_of_that_name_is_named_with_what_cures_it(impostor: str, words: str) -> None:
-    done = misled(impostor, *words.split())
+    done = process(*words.split(), PYTHONPATH=impostor)
     assert done.code == 2, "1 would mean a disagreement"
     assert "pinocchio 0.5.1, another project" in done.err
     assert "pip uninstall pinocchio; pip install 'pin>=4,<5'" in done.err
@@ -66,7 +59,7 @@ def test_another_project_of_that_name_is_named_with_what_cures_it(impostor: str,
 
 @pytest.mark.slow
 def test_without_a_check_nobody_asks_which_it_is(impostor: str) -> None:
-    done = misled(impostor, "placement", "elbow", "--no-verify")
+    done = process("placement", "elbow", "--no-verify", PYTHONPATH=impostor)
     assert done.code == 3
     assert "NOT VERIFIED" in done.text
 
@@ -74,7 +67,7 @@ def test_without_a_check_nobody_asks_which_it_is(impostor: str) -> None:
 @pytest.mark.slow
 def test_a_file_of_that_name_beside_ones_program_is_named(tmp_path: Path) -> None:
     (tmp_path / "pinocchio.py").write_text("")
-    done = misled(str(tmp_path), "--version")
+    done = process("--version", PYTHONPATH=str(tmp_path))
     assert f"rename or remove {tmp_path / 'pinocchio.py'}" in done.err
 
 
@@ -110,18 +103,16 @@ SUBJECTS: dict[str, tuple[str, dict[str, Any]]] = {
     "an arm": (arm(axis='<axis xyz="1 2 -3"/>'), {}),
     "a slide": (arm(attributes='type="prismatic"'), {}),
     "a planar joint below a floating one": (
-        arm(attributes='type="floating"', axis="", limit="", second='type="planar"'),
-        {},
+        arm(attributes='type="floating"', axis="", limit="", second='type="planar"'), {},
     ),
     "a follower": (arm(follow='<mimic joint="j1" multiplier="-2" offset="0.3"/>'), {}),
     "a follower set free": (arm(follow='<mimic joint="j1" multiplier="-2"/>'), {"mimic": False}),
     "names that MuJoCo takes": (
-        arm(base='<link name="base"/><link name="world"/>', more=fixed("l1", "tool", "world")),
-        {},
+        arm(base='<link name="base"/><link name="world"/>', more=fixed("l1", "tool", "world")), {},
     ),
     "hung from a floating joint": (arm(), {"root_joint": "floating"}),
     "hung from a planar joint": (arm(), {"root_joint": "planar"}),
-}
+}  # fmt: skip
 
 
 def base_motion(rng: np.random.Generator, size: float) -> urdfkin.BaseMotion:
@@ -200,10 +191,8 @@ def test_a_lever_that_is_nothing_is_nothing_to_mujoco() -> None:
 
 
 def test_a_chain_that_is_too_deep_for_mujoco_is_not_handed_to_it() -> None:
-    links = "".join(f'<link name="l{i}"/>' for i in range(1_102))
-    joints = "".join(fixed(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(1_101))
-    text = f'<robot name="r">{links}{joints}</robot>'
-    robot = urdfkin.load(text, oracle="mujoco")
+    joints = (fixed(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(1_101))
+    robot = urdfkin.load(urdfs.robot(*joints), oracle="mujoco")
     with pytest.warns(NotVerifiedWarning, match=r"chains of up to 1,000 links: found 1,101"):
         robot.placement([], "l9")
 
@@ -215,13 +204,9 @@ def test_what_pinocchio_refuses_mujoco_may_check() -> None:
     assert robot.certificate().verified
 
 
-@pytest.mark.parametrize(
-    ("method", "quantity"),
-    [("placements", "placement"), ("jacobians", "jacobian"), ("velocities", "velocity")],
-)
-def test_a_disagreement_with_mujoco_is_raised_in_its_name(
-    method: str, quantity: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("quantity", ["placement", "jacobian", "velocity"])
+def test_a_disagreement_with_mujoco_bears_its_name(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    method = {"velocity": "velocities"}.get(quantity, f"{quantity}s")
     right = getattr(MujocoOracle, method)
     monkeypatch.setattr(MujocoOracle, method, lambda *given: right(*given) + 1e-9)
     robot = urdfkin.load(arm(), oracle="mujoco")
@@ -292,13 +277,7 @@ def test_options_of_load_are_no_difference(how: dict[str, Any]) -> None:
 
 def more(x: float, *at: int) -> Callable[[Any], Any]:
     """Return the change of an array at one place."""
-
-    def changed(array: Any) -> Any:
-        array = array.copy()
-        array[at] += x
-        return array
-
-    return changed
+    return lambda array: array + x * np.equal(np.indices(array.shape).T, at).all(axis=-1).T
 
 
 #: Attribute of the joint that yourdfpy reads, its change, and the words about it.
@@ -343,8 +322,7 @@ def test_a_different_mimic_rule_is_reported(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_a_bent_axis_fails_the_validation(monkeypatch: pytest.MonkeyPatch) -> None:
     plant(monkeypatch, *PLANTED["axis"][:2])
-    report = validate(ARM, samples=0)
-    (robot,) = report.robots
+    (robot,) = validate(ARM, samples=0).robots
     assert robot.verdict is Verdict.DISAGREES
     assert "yourdfpy" in str(robot.reason)
     assert "joint turn: axis" in str(robot.reason)
@@ -375,7 +353,7 @@ def test_a_document_type_is_not_given_to_yourdfpy() -> None:
 
 
 def test_the_declared_encoding_of_the_file_does_not_matter() -> None:
-    assert reading(ARM.replace("turn", "drehen_ä")).differences == ()
-    declared = '<?xml version="1.0" encoding="latin-1"?>' + ARM.replace("turn", "drehen_ä")
-    tree = loaded(ARM.replace("turn", "drehen_ä"), verify=False).tree
-    assert second_reading(declared, tree).differences == ()
+    text = ARM.replace("turn", "drehen_ä")
+    assert reading(text).differences == ()
+    declared = '<?xml version="1.0" encoding="latin-1"?>' + text
+    assert second_reading(declared, loaded(text, verify=False).tree).differences == ()

@@ -165,9 +165,7 @@ def test_a_checked_jacobian_takes_few_calls_of_functions(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True])
 @pytest.mark.parametrize("subject", [*NAMES, "ur5", "tiago"])
-def test_the_lengths_of_one_configuration_have_the_bits_of_those_in_a_batch(
-    subject: str, moving: bool
-) -> None:
+def test_the_lengths_of_one_configuration_have_the_bits_of_those_in_many(subject: str, moving: bool) -> None:
     robot = robot_of(subject) if subject in NAMES else urdfkin.load(subject, verify=False)
     rng = np.random.default_rng(1)
     drawn = draw(robot.tree, 9, rng, with_special=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -45,8 +46,8 @@ def true_jacobian(robot: Robot, q: FloatArray, frame: str) -> np.ndarray:
 
 
 def holds(found: Between, true: list[mpmath.mpf]) -> bool:
-    ends = zip(found.lower.tolist(), true, found.upper.tolist(), strict=True)
-    return all(mp.mpf(low) <= x <= mp.mpf(high) for low, x, high in ends)
+    low, high = (np.atleast_1d(end).tolist() for end in (found.lower, found.upper))
+    return all(mp.mpf(a) <= x <= mp.mpf(b) for a, x, b in zip(low, true, high, strict=True))
 
 
 @pytest.mark.slow
@@ -60,12 +61,10 @@ def test_what_the_equations_have_at_fifty_digits_lies_between(name: str, frame: 
         moving = [i for i in range(robot.nv) if found.V[i].any() or any(J[:, i])]
         true = true_values(J[:, moving])
         assert holds(found.values, true)
-        count = found.values.value.size
         assert (found.values.upper - found.values.lower).max() < 1e-11 * found.values.value.max()
-        product, ratio = mp.fprod(true), true[0] / true[-1] if true[-1] else mp.inf
-        assert holds(Between(*(np.array([x]) for x in found.manipulability)), [product])
-        assert holds(Between(*(np.array([x]) for x in found.condition)), [ratio])
-        assert count == min(len(J), len(moving))
+        assert holds(found.manipulability, [mp.fprod(true)])
+        assert holds(found.condition, [true[0] / true[-1] if true[-1] else mp.inf])
+        assert found.values.value.size == min(len(J), len(moving))
 
 
 def test_a_jacobian_that_is_wrong_by_a_billionth_is_not_excused() -> None:
@@ -79,23 +78,18 @@ def test_a_jacobian_that_is_wrong_by_a_billionth_is_not_excused() -> None:
 
 @settings(max_examples=12)
 @given(
-    st.tuples(st.integers(1, 6), st.integers(1, 8)),
-    st.integers(-12, 12),
-    st.booleans(),
-    st.integers(0, 2**32 - 1),
+    *(st.integers(1, 6), st.integers(1, 8), st.integers(-12, 12), st.booleans(), st.integers(0, 2**32 - 1))
 )
 def test_any_matrixs_lie_between_whatever_their_size_and_rank(
-    shape: tuple[int, int], exponent: int, deficient: bool, seed: int
+    rows: int, columns: int, exponent: int, deficient: bool, seed: int
 ) -> None:
-    generator = np.random.default_rng(seed)
-    A = generator.standard_normal(shape) * 10.0 ** generator.uniform(
-        min(0, exponent), max(0, exponent), shape
-    )
+    generator, shape = np.random.default_rng(seed), (rows, columns)
+    A = generator.standard_normal(shape)
+    A *= 10.0 ** generator.uniform(min(0, exponent), max(0, exponent), shape)
     if deficient:
         A[-1] = A[0]
-    found = singular_values(A, np.zeros(shape), np.ones(shape[1], dtype=bool))
-    true = true_values(exact(A))
-    assert holds(found.values, true)
+    found = singular_values(A, np.zeros(shape), np.ones(columns, dtype=bool))
+    assert holds(found.values, true_values(exact(A)))
     assert (found.values.upper - found.values.lower <= 1e-12 * found.values.value[0]).all()
 
 
@@ -108,10 +102,9 @@ def test_they_lie_between_however_small_or_large_the_matrix_is(exponent: int, de
     A = np.ldexp(A, exponent)
     found = singular_values(A, np.abs(A) * 2.0**-52, np.ones(4, dtype=bool))
     unit = mp.mpf(2) ** exponent
-    scaled = exact(A) / unit
-    true = [x * unit for x in true_values(scaled)]
+    true = [x * unit for x in true_values(exact(A) / unit)]
     assert holds(found.values, true)
-    assert holds(Between(*(np.array([x]) for x in found.manipulability)), [mp.fprod(true)])
+    assert holds(found.manipulability, [mp.fprod(true)])
     room = 1e-12 * found.values.value[0] + 1e-306  # below, the smallest normal number hides digits
     assert (found.values.upper - found.values.lower <= room).all()
 
@@ -120,17 +113,12 @@ def test_they_lie_between_however_small_or_large_the_matrix_is(exponent: int, de
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 def test_a_singular_arm_of_any_size_is_never_proven_to_be_regular(size: float) -> None:
     # Both levers point the same way where the second joint is at 0.
-    joint = (
-        '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><origin xyz="{4!r} {5!r} 0"/>'
-        '<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+    text = urdfs.robot(
+        joint("j", "revolute", "a", "b", more=limit(-3, 3)),
+        joint("k", "revolute", "b", "c", f'xyz="{0.7 * size} {0.3 * size} 0"', more=limit(-3, 3)),
+        joint("t", "fixed", "c", "d", f'xyz="{1.4 * size} {0.6 * size} 0"'),
     )
-    joints = [
-        joint.format("j", "revolute", "a", "b", 0.0, 0.0),
-        joint.format("k", "revolute", "b", "c", 0.7 * size, 0.3 * size),
-        joint.format("t", "fixed", "c", "d", 1.4 * size, 0.6 * size),
-    ]
-    links = "".join(f'<link name="{name}"/>' for name in "abcd")
-    robot = urdfkin.load(f'<robot name="r">{links}{"".join(joints)}</robot>')
+    robot = urdfkin.load(text)
     q = np.stack([np.linspace(-3.0, 3.0, 200), np.zeros(200)], axis=-1)
     found = robot.singular_values(q, "d", "linear")
     assert (found.values.lower[:, 1] == 0.0).all()
@@ -153,8 +141,8 @@ def test_a_product_lies_between_where_a_part_of_it_is_beyond_all_numbers(
     values = np.array(sorted(sizes, reverse=True))
     bounds = Between(values, values * (1.0 - 1e-15), values * (1.0 + 1e-15))
     found = SingularValues(slice(None), bounds, np.eye(len(sizes)), np.eye(len(sizes)))
-    assert holds(Between(*(np.array([x]) for x in found.manipulability)), [product])
-    assert holds(Between(*(np.array([x]) for x in found.condition)), [mp.mpf(values[0]) / mp.mpf(values[-1])])
+    assert holds(found.manipulability, [product])
+    assert holds(found.condition, [mp.mpf(values[0]) / mp.mpf(values[-1])])
 
 
 # -- each term of the bounds is needed -----------------------------------------------------------------
@@ -164,61 +152,48 @@ def test_what_the_matrix_may_be_off_by_is_in_the_bounds() -> None:
     A, off = np.diag([2.0, 1.0]), np.full((2, 2), 1e-6)
     found = singular_values(A, off, np.ones(2, dtype=bool))
     for sign in (1.0, -1.0):
-        true = true_values(exact(A + sign * off))
-        assert holds(found.values, true)
+        assert holds(found.values, true_values(exact(A + sign * off)))
     # All of it: what is off by the same in every number moves one of them by its norm.
     alone = singular_values(np.zeros((2, 2)), off, np.ones(2, dtype=bool))
     assert holds(alone.values, true_values(exact(off)))
     assert alone.values.upper[0] == pytest.approx(2e-6, rel=1e-12)
 
 
-def decomposed(seed: int, values: tuple[float, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rotations that are right to rounding, and values between them."""
+def decomposed(seed: int, values: tuple[float, ...]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Rotations that are right to rounding, values between them, and their product."""
     generator = np.random.default_rng(seed)
     U, V = (np.linalg.qr(generator.standard_normal((3, 3)))[0] for _ in range(2))
-    return U, np.array(values), V.T.copy()
+    return U, np.array(values), V.T.copy(), (U * np.array(values)) @ V.T.copy()
 
 
-def holds_with(
-    monkeypatch: pytest.MonkeyPatch, A: FloatArray, svd: tuple[FloatArray, FloatArray, FloatArray]
-) -> bool:
+def holds_with(A: FloatArray, *svd: FloatArray) -> bool:
     """Whether the true values lie between the bounds that are made of this decomposition of a matrix."""
     true = true_values(exact(A))
-    with monkeypatch.context() as patched:
+    with pytest.MonkeyPatch.context() as patched:
         patched.setattr(np.linalg, "svd", lambda *_, **__: svd)
         return holds(singular_values(A, np.zeros(A.shape), np.ones(A.shape[1], dtype=bool)).values, true)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_decomposition_that_leaves_a_residual_is_not_believed(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    U, s, Vt = decomposed(seed, (3.0, 2.0, 1.0))
-    A = (U * s) @ Vt
+def test_a_decomposition_that_leaves_a_residual_is_not_believed(seed: int) -> None:
+    U, s, Vt, A = decomposed(seed, (3.0, 2.0, 1.0))
     for wrong in ([1e-9, 0.0, 0.0], [0.0, -1e-9, 0.0], [0.0, 0.0, 1e-9]):
-        assert holds_with(monkeypatch, A, (U, s + np.array(wrong), Vt))
+        assert holds_with(A, U, s + np.array(wrong), Vt)
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize("size", [1.0 + 1e-9, 1.0 - 1e-9])
-def test_a_decomposition_that_is_askew_is_not_believed(
-    seed: int, side: int, size: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    U, s, Vt = decomposed(seed, (3.0, 2.0, 1.0))
-    A = (U * s) @ Vt
-    scaled = (U * size, s / size, Vt) if side == 0 else (U, s / size, Vt * size)
-    assert holds_with(monkeypatch, A, scaled)
+def test_a_decomposition_that_is_askew_is_not_believed(seed: int, side: int, size: float) -> None:
+    U, s, Vt, A = decomposed(seed, (3.0, 2.0, 1.0))
+    assert holds_with(A, *((U * size, s / size, Vt) if side == 0 else (U, s / size, Vt * size)))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_what_the_residual_itself_is_rounded_by_is_in_the_bounds(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    U, s, Vt = decomposed(seed, (1.0, 1e-12, 1e-13))
-    A = (U * s[np.newaxis, :]) @ Vt
-    assert not np.abs(A - (U * s[np.newaxis, :]) @ Vt).any(), "the residual, as it is computed, is 0"
-    assert holds_with(monkeypatch, A, (U, s, Vt))
+def test_what_the_residual_itself_is_rounded_by_is_in_the_bounds(seed: int) -> None:
+    U, s, Vt, A = decomposed(seed, (1.0, 1e-12, 1e-13))
+    assert not np.abs(A - (U * s) @ Vt).any(), "the residual, as it is computed, is 0"
+    assert holds_with(A, U, s, Vt)
 
 
 def test_products_that_underflow_are_in_the_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -243,10 +218,8 @@ def test_the_bounds_are_rounded_outward() -> None:
         assert mp.mpf(float(off.values.upper[0])) ** 2 >= 3 * mp.mpf(x) ** 2
         values = np.array([max(x, y), min(x, y)])
         found = SingularValues(slice(None), Between(values, values, values), np.eye(2), np.eye(2))
-        for between, true in (
-            (found.manipulability, mp.mpf(x) * mp.mpf(y)),
-            (found.condition, mp.mpf(values[0]) / mp.mpf(values[1])),
-        ):
+        one, other = map(mp.mpf, values)
+        for between, true in ((found.manipulability, one * other), (found.condition, one / other)):
             assert mp.mpf(float(between.lower)) < true < mp.mpf(float(between.upper))
 
 
@@ -302,10 +275,6 @@ def test_a_frame_that_no_rate_moves_has_none() -> None:
     assert not found.manipulability_gradient(robot.hessian(robot.sample(3), "panda_link0")).any()
 
 
-def product(found: SingularValues) -> FloatArray:
-    return found.manipulability.value
-
-
 @pytest.mark.parametrize("rows", ROWS)
 @pytest.mark.parametrize(
     ("name", "frame"), [("panda", "panda_hand"), ("ur5", "forearm_link"), ("polar", "slider")]
@@ -319,9 +288,9 @@ def test_the_gradient_is_the_difference_quotient_of_the_product(name: str, frame
     gradient = found.manipulability_gradient(robot.hessian(q, frame))
     sure = found.values.lower[:, -1] > 1e-3
     for j, step in enumerate(h * np.eye(robot.nv)):
-        ahead, behind = (product(robot.singular_values(q + x, frame, rows)) for x in (step, -step))
-        slope = (ahead - behind) / (2.0 * h)
-        np.testing.assert_allclose(gradient[sure, j], slope[sure], rtol=0, atol=1e-7)
+        near = (robot.singular_values(q + x, frame, rows) for x in (step, -step))
+        ahead, behind = (one.manipulability.value[sure] for one in near)
+        np.testing.assert_allclose(gradient[sure, j], (ahead - behind) / (2.0 * h), rtol=0, atol=1e-7)
 
 
 def test_at_a_kink_there_is_no_gradient_and_beside_it_there_is() -> None:
@@ -363,9 +332,8 @@ UR5 = [0.3, -1.0, 1.0, 0.4, 0.5, 0.6]
 WRISTS = "shoulder_lift_joint, elbow_joint, wrist_1_joint"
 
 
-def found(robot: Robot | str, q: object, rows: str = "all", frame: str | None = None) -> Singularity:
-    robot = urdfkin.load(robot) if isinstance(robot, str) else robot
-    return robot.singular_values(q, frame or robot.tip_frame, rows).singularity()  # type: ignore[arg-type]
+def found(robot: Robot, q: Any, rows: str = "all") -> Singularity:
+    return robot.singular_values(q, robot.tip_frame, rows).singularity()
 
 
 @pytest.mark.parametrize(
@@ -384,19 +352,13 @@ def found(robot: Robot | str, q: object, rows: str = "all", frame: str | None = 
          "The axes of joints panda_joint2, panda_joint4 and panda_joint6 are parallel."),
     ],
 )  # fmt: skip
-def test_the_reason_names_the_joints_and_their_geometry(
-    robot: str, q: list[float] | str, rows: str, reason: str
-) -> None:
-    assert reason in found(robot, q, rows).reasons
+def test_the_reason_names_the_joints_and_their_geometry(robot: str, q: Any, rows: str, reason: str) -> None:
+    assert reason in found(urdfkin.load(robot), q, rows).reasons
 
 
 def test_no_joint_velocity_moves_the_frame_in_a_lost_direction_and_no_null_motion_moves_it_at_all() -> None:
     robot = urdfkin.load("ur5")
-    for q in (
-        robot.neutral(),
-        np.array([0.3, -1.0, 0.0, 0.4, 0.5, 0.6]),
-        np.array([0.3, -1.0, 1.0, 0.4, 0.0, 0.6]),
-    ):
+    for q in (np.zeros(6), np.array([0.3, -1, 0, 0.4, 0.5, 0.6]), np.array([0.3, -1, 1, 0.4, 0, 0.6])):
         one, J = found(robot, q), robot.jacobian(q, "tool0")
         assert (one.rank, one.full, bool(one)) == (5, 6, True)
         assert one.lost.shape == one.motions.shape == (1, 6)
@@ -437,22 +399,18 @@ def test_the_base_of_a_moving_robot_turns_the_lost_direction() -> None:
     assert one.lost.round(9).tolist() == [[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]]
 
 
-def revolute(z: FloatArray, point: FloatArray) -> FloatArray:
-    return np.concatenate([np.cross(point, z), z])
-
-
 def explained(J: FloatArray, turns: bool | None = True) -> Singularity:
     generic = np.random.default_rng(1).normal(size=(2, *J.shape))
     names, active = tuple(f"j{i}" for i in range(J.shape[1])), np.ones(J.shape, dtype=bool)
-    error, moving = np.full(J.shape, 1e-15), np.ones(J.shape[1], dtype=bool)
-    turning = (turns,) * J.shape[1]
+    error, turning = np.full(J.shape, 1e-15), (turns,) * J.shape[1]
     columns = FrameColumns(J, error, "tip", names, turning, active, lambda: generic, moving_base=False)
-    return singular_values(J, error, moving, slice(0, 6), columns).singularity()
+    return singular_values(J, error, active[0], slice(0, 6), columns).singularity()
 
 
 def axes(points: FloatArray, z: FloatArray) -> FloatArray:
+    """Columns of revolute joints."""
     units = z / np.linalg.norm(z, axis=1, keepdims=True)
-    return np.array([revolute(*pair) for pair in zip(units, points, strict=True)]).T
+    return np.hstack([np.cross(points, units), units]).T
 
 
 def test_six_axes_that_meet_one_line_name_this_line() -> None:

@@ -48,12 +48,8 @@ def test_meshes_are_found_by_package_by_file_and_beside_the_urdf(tmp_path: Path)
     file.write_text("solid")
     urdf = tmp_path / "robots" / "urdf" / "r.urdf"
     urdf.parent.mkdir()
-    for address in (
-        "package://robots/meshes/a b.stl",
-        "package:///robots/meshes/a b.stl",
-        "../meshes/a b.stl",
-        file.as_uri(),
-    ):
+    packaged = "package://robots/meshes/a b.stl", "package:///robots/meshes/a b.stl"
+    for address in (*packaged, "../meshes/a b.stl", file.as_uri()):
         found = mesh_file(address, urdf)
         assert found is not None, address
         assert found.samefile(file)
@@ -77,9 +73,7 @@ def x() -> FrameMotion:
 
 
 @pytest.mark.parametrize("angular", [False, True])
-def test_velocities_of_unit_rates_touch_the_ellipsoid_and_none_leaves_it(
-    angular: bool, x: FrameMotion
-) -> None:
+def test_velocities_of_unit_rates_touch_the_ellipsoid_and_stay_inside(angular: bool, x: FrameMotion) -> None:
     shape = velocity_ellipsoid(x, 1.0, angular=angular)
     R = rotation_of(np.roll(shape.wxyz, -1))
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]

@@ -76,10 +76,8 @@ def test_a_slider_moves_its_own_joint_and_the_numbers_are_checked(viewer: Viewer
 
 def shown(viewer: Viewer) -> list[float]:
     scale = np.pi / 180.0 if viewer.units.value == "degrees" else 1.0
-    return [
-        handle.value * (scale if row.turns else 1.0)
-        for row, handle in zip(viewer.sliders.rows, viewer.sliders.handles, strict=True)
-    ]
+    both = zip(viewer.sliders.rows, viewer.sliders.handles, strict=True)
+    return [handle.value * (scale if row.turns else 1.0) for row, handle in both]
 
 
 @pytest.mark.slow
@@ -124,13 +122,10 @@ def test_a_slider_ends_where_its_joint_does_and_a_joint_without_a_range_has_none
     assert [row.name for row in coordinate_rows(urdfkin.load("ur5", root_joint="floating"))][:4] == [
         "root_joint.x", "root_joint.y", "root_joint.z", "shoulder_pan_joint",
     ]  # fmt: skip
+    turns = joint("turns", "revolute", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(-1, 1))
+    stays = joint("stays", "revolute", "b", "c", 'xyz="0 0 1"', "0 1 0", limit(0.5, 0.5))
     with pytest.warns(UrdfWarning, match="its limits are equal"):
-        robot = urdfkin.load(
-            robot_of(
-                joint("turns", "revolute", "a", "b", 'xyz="0 0 1"', "0 1 0", limit(-1, 1)),
-                joint("stays", "revolute", "b", "c", 'xyz="0 0 1"', "0 1 0", limit(0.5, 0.5)),
-            )
-        )
+        robot = urdfkin.load(robot_of(turns, stays))
     assert [row.name for row in coordinate_rows(robot)] == ["turns"]
     assert fixed_coordinates(robot) == ["stays"]
     assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
@@ -160,8 +155,7 @@ def test_missing_meshes_are_named_with_the_remedy() -> None:
 
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])
 def test_the_robot_fills_the_view_and_nothing_of_it_is_cut_off(aspect: float) -> None:
-    points = np.random.default_rng(0).uniform([-1.0, -0.2, 0.0], [0.5, 0.2, 2.0], (500, 3))
-    fov = 1.0
+    points, fov = np.random.default_rng(0).uniform([-1.0, -0.2, 0.0], [0.5, 0.2, 2.0], (500, 3)), 1.0
     position, middle = camera(points, aspect=aspect, fov=fov)
     back = (position - middle) / np.linalg.norm(position - middle)
     right = np.cross([0.0, 0.0, 1.0], back)
@@ -207,9 +201,7 @@ def test_names_stand_beside_the_frames(viewer: Viewer, kind: str, name: str) -> 
     assert not any(handle.visible for handles in viewer.stage._labels.values() for handle in handles)
 
 
-def test_the_browser_is_started_with_a_file_that_nobody_else_can_read(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_browser_is_started_with_a_file_that_no_other_can_read(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
     monkeypatch.setattr("webbrowser.open", asked.append)
     address = "http://127.0.0.1:8080/the-key/"
@@ -257,9 +249,7 @@ def test_robots_of_other_kinds_are_shown_too(name: str) -> None:
 
 @pytest.mark.long
 @pytest.mark.browser
-def test_a_browser_draws_it_without_errors_and_without_asking_elsewhere(
-    viewer: Viewer, tmp_path: Path
-) -> None:
+def test_a_browser_draws_it_without_errors_and_asks_nothing_elsewhere(viewer: Viewer, tmp_path: Path) -> None:
     require_chromium()
     viewer.ellipsoid.value, viewer.columns.value = "linear", "linear"
     viewer.update()
@@ -377,9 +367,7 @@ def _until(holds: Callable[[], bool]) -> bool:
 @pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("width", [1280, 390])
-def test_in_a_browser_every_slider_equals_q_and_none_speaks_for_another(
-    chromium: Browser, width: int
-) -> None:
+def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium: Browser, width: int) -> None:
     # Without its shapes, and nothing is drawn: by software a browser would spend its time there.
     bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("panda").urdf, flags=re.DOTALL)
     with shown_robot(urdfkin.load(bare)) as viewer:

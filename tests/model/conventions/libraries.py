@@ -32,6 +32,7 @@ from xml.etree.ElementTree import SubElement, tostring
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS
 from urdfkin.model.conventions.convention import transcoded
@@ -241,13 +242,13 @@ def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) 
             state.joint_qd.assign(v.astype(np.float32))
             sim.eval_fk(model, state.joint_q, state.joint_qd, state)
             six: FloatArray = state.body_qd.numpy()[body].astype(float)  # of the centre of mass
-            R = _rotation(state.body_q.numpy()[body][3:].astype(float))
+            R = Rotation.from_quat(state.body_q.numpy()[body][3:].astype(float)).as_matrix()
             six[:3] -= np.cross(six[3:], R @ com[body])
             return six
 
         found, T = twist(v), np.eye(4)
         pose = state.body_q.numpy()[body].astype(float)
-        T[:3, :3], T[:3, 3] = _rotation(pose[3:]), pose[:3]
+        T[:3, :3], T[:3, 3] = Rotation.from_quat(pose[3:]).as_matrix(), pose[:3]
         return T, found, np.stack([twist(e) for e in np.eye(len(v))], axis=-1)
 
     return Library(names, evaluate, SINGLE, SINGLE_EPS, more=2, at_mass=True)
@@ -339,16 +340,6 @@ def usd(robot: Robot, folder: Path) -> Library:
     return Library(["root_joint"] * free + moving, evaluate, SINGLE, SINGLE_EPS)
 
 
-def _rotation(xyzw: FloatArray) -> FloatArray:
-    x, y, z, w = xyzw / np.linalg.norm(xyzw)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.array(rows)
-
-
 def pinocchio(robot: Robot, folder: Path) -> Library:
     import pinocchio as pin  # noqa: PLC0415
 
@@ -366,12 +357,6 @@ def pinocchio(robot: Robot, folder: Path) -> Library:
 
 
 LIBRARIES = {
-    "pinocchio": pinocchio,
-    "mujoco": mujoco,
-    "drake": drake,
-    "idyntree": idyntree,
-    "rtb": rtb,
-    "newton": newton,
-    "newton-usd": newton_usd,
-    "usd": usd,
-}
+    "pinocchio": pinocchio, "mujoco": mujoco, "drake": drake, "idyntree": idyntree, "rtb": rtb,
+    "newton": newton, "newton-usd": newton_usd, "usd": usd,
+}  # fmt: skip

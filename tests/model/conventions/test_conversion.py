@@ -5,16 +5,19 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import urdfkin
-from tests.cli.running import urdfkin as run
+from tests import urdfs
+from tests.cli.running import good
 from tests.comparison.pairs import disguised, loaded
 from tests.comparison.pairs import robot as pair
 from tests.model.conventions.libraries import LIBRARIES
 from tests.reading import present
+from tests.urdfs import joint, limit, mimic
 from urdfkin.comparison.result import Sameness
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
@@ -31,25 +34,18 @@ from urdfkin.verify.quantities import JACOBIAN, PLACEMENT, Quantity
 
 FLOATING = tuple(name for name in BUILT_IN if name != "idyntree")
 #: Every combination of axes, orders and points, also those that no tool has.
+_FIELDS: dict[Any, tuple[str, str]] = {
+    "linear": ("body", "parent"), "angular": ("body", "parent"), "base_v": ("linear first", "angular first"),
+    "point": ("origin", "centre of mass"), "quaternion": ("xyzw", "wxyz"),
+}  # fmt: skip
 ODD = [
-    Convention(
-        name=f"odd {k}", linear=linear, angular=angular, base_v=order, point=point, six=order, quaternion=quat
-    )
-    for k, (linear, angular, order, point, quat) in enumerate(
-        itertools.product(
-            ("body", "parent"),
-            ("body", "parent"),
-            ("linear first", "angular first"),
-            ("origin", "centre of mass"),
-            ("xyzw", "wxyz"),
-        )
-    )
+    replace(Convention(name=f"odd {k}", six=how[2]), **dict[Any, Any](zip(_FIELDS, how, strict=True)))
+    for k, how in enumerate(itertools.product(*_FIELDS.values()))
 ]
-PLANAR = """<robot name="cart"><link name="world"/><link name="cart"/><link name="arm"/>
-<joint name="plane" type="planar"><parent link="world"/><child link="cart"/><axis xyz="0 0 1"/>
-<origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/></joint>
-<joint name="turn" type="continuous"><parent link="cart"/><child link="arm"/><axis xyz="0 1 0"/>
-<origin xyz="0.5 0 0"/></joint></robot>"""
+PLANAR = urdfs.robot(
+    joint("plane", "planar", "world", "cart", 'xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"'),
+    joint("turn", "continuous", "cart", "arm", 'xyz="0.5 0 0"', "0 1 0"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -92,9 +88,8 @@ def test_from_undoes_to(dog: Robot, cart: Robot, convention: Convention) -> None
 
 
 @pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
-def test_the_derivative_of_the_converted_velocity_is_the_converted_acceleration(
-    dog: Robot, cart: Robot, convention: Convention
-) -> None:
+def test_converted_accelerations_are_derivatives(dog: Robot, cart: Robot, convention: Convention) -> None:
+    """Of the converted velocities, along the motion."""
     h = 1e-4
     for robot in (dog, cart):
         conversion = robot.convention(convention)
@@ -105,9 +100,7 @@ def test_the_derivative_of_the_converted_velocity_is_the_converted_acceleration(
 
 
 @pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
-def test_a_robot_in_a_convention_keeps_the_identities(
-    dog: Robot, cart: Robot, convention: Convention
-) -> None:
+def test_a_robot_in_a_convention_keeps_identities(dog: Robot, cart: Robot, convention: Convention) -> None:
     for robot, frame in ((dog, "FL_foot"), (cart, "arm")):
         other = robot.with_convention(convention)
         ours = _values(robot)
@@ -119,9 +112,7 @@ def test_a_robot_in_a_convention_keeps_the_identities(
         assert np.allclose(other.acceleration(q, v, a, frame), expected, 0, 1e-11)
         H = other.hessian(q, frame)
         assert np.allclose(np.einsum("nrij,nj->nri", H, v), rate, 0, 1e-11)
-        assert np.array_equal(other.placement(q, frame), robot.placement(ours[0], frame)) or np.allclose(
-            other.placement(q, frame), robot.placement(ours[0], frame), 0, 1e-13
-        )
+        assert np.allclose(other.placement(q, frame), robot.placement(ours[0], frame), 0, 1e-13)
 
 
 def test_several_frames_at_once_are_each_as_alone(dog: Robot) -> None:
@@ -168,22 +159,16 @@ def test_a_users_file_has_order_names_signs_units_and_motor_zeros(tmp_path: Path
     assert np.allclose(other.jacobian(q, "tip") @ v, arm.velocity([0.1, 0.2], [1.0, 2.0], "tip"))
 
 
+TWICE = "two joints have the same name in the convention: found"
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ('joints = ["joint_1"]', "the order of joints lacks a joint: found joint_2"),
-        (
-            'joints = ["joint_1", "joint_1"]',
-            "two joints have the same name in the convention: found 'joint_1'",
-        ),
-        (
-            '[joint.joint_1]\nname = "m"\n[joint.joint_2]\nname = "m"',
-            "two joints have the same name in the convention: found 'm'",
-        ),
-        (
-            '[joint.joint_1]\nname = "joint_2"',
-            "two joints have the same name in the convention: found 'joint_2'",
-        ),
+        ('joints = ["joint_1", "joint_1"]', f"{TWICE} 'joint_1'"),
+        ('[joint.joint_1]\nname = "m"\n[joint.joint_2]\nname = "m"', f"{TWICE} 'm'"),
+        ('[joint.joint_1]\nname = "joint_2"', f"{TWICE} 'joint_2'"),
         ("[joint.joint_1]\nsign = 2", "joint joint_1: `sign` must be 1 or -1: found 2"),
         ("[joint.joint_1]\nunit = 'mm'", "joint joint_1: this `unit` is for a joint with a length"),
         ("[joint.joint_1]\nunit = -1", "`unit` must be positive"),
@@ -215,9 +200,7 @@ def test_a_wrong_file_is_one_error_with_its_place(text: str, words: str, tmp_pat
         ("[joint.joint_1]\nsing = 1", "did you mean sign"),
     ],
 )
-def test_an_unknown_name_in_a_file_is_an_error_with_the_nearest(
-    text: str, words: str, tmp_path: Path
-) -> None:
+def test_an_unknown_name_in_a_file_is_refused_with_the_nearest(text: str, words: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(text)
     with pytest.raises(UnknownNameError) as caught:
@@ -288,10 +271,9 @@ def test_names_in_usd_are_those_of_the_libraries() -> None:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["newton", "newton-usd", "usd"])
 def test_a_library_writes_odd_names_as_the_convention_says(name: str, tmp_path: Path) -> None:
-    text = (
-        PLANAR.replace('type="planar"', 'type="continuous"').replace("plane", "1").replace('"turn"', '"a-b"')
-    )
-    robot = urdfkin.load(text.replace('"world"', '"ground"'), verify=False)
+    text = PLANAR.replace('type="planar"', 'type="continuous"').replace("plane", "1")
+    text = text.replace('"turn"', '"a-b"').replace('"world"', '"ground"')
+    robot = urdfkin.load(text, verify=False)
     library = LIBRARIES[name](robot, tmp_path)
     assert list(robot.convention(name).joint_names) == library.names
 
@@ -307,8 +289,7 @@ def _room(robot: Robot, q: FloatArray, links: list[str], quantity: Quantity) -> 
     """Return the bound of the rounding errors of a quantity at q (nq,): (links, ...)."""
     plan = robot.plan([robot.tree.link_index(link) for link in links])
     bound = quantity.bound(plan, magnitudes(plan, q[None], None, None, STILL_STATE), ALIGNED)
-    found: FloatArray = (EPS * bound.k * bound.scale)[0]
-    return found
+    return np.asarray((EPS * bound.k * bound.scale)[0])
 
 
 def _excess(found: Sameness, a: Robot, b: Robot, conversion: Conversion) -> float:
@@ -326,10 +307,8 @@ def _excess(found: Sameness, a: Robot, b: Robot, conversion: Conversion) -> floa
         q_b = conversion.to(q_a)
         base = f"link:{found.base_links[1]}"
         X = found.base @ b.placement(b.neutral(), base) @ np.linalg.inv(b.placement(q_b, base))
-        T_a, T_b = (
-            a.placement(q_a, [f"link:{x}" for x in ours]),
-            b.placement(q_b, [f"link:{x}" for x in theirs]),
-        )
+        T_a = a.placement(q_a, [f"link:{x}" for x in ours])
+        T_b = b.placement(q_b, [f"link:{x}" for x in theirs])
         for k, two in enumerate(pairs):
             T_a[k] = T_a[k] @ tools.get(two, np.eye(4))
         room = _room(a, q_a, ours, PLACEMENT) + 4.0 * _room(b, q_b, theirs, PLACEMENT)
@@ -403,20 +382,15 @@ def test_a_planted_mistake_in_a_map_is_seen(name: str, mistake: str) -> None:
     assert _excess(found, a, b, a.convention(_wrong(found.convention(), mistake))) > 100.0
 
 
-ARM = """<robot name="arm"><link name="l0"/><link name="l1"/><link name="l2"/>
-<joint name="a" type="revolute"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/>{}</joint>
-<joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="1 0 0"/><axis xyz="0 1 0"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/>{}</joint></robot>"""
+def arm_with(rule_of_a: str = "", rule_of_b: str = "") -> Robot:
+    a = joint("a", "revolute", "l0", "l1", more=limit() + rule_of_a)
+    b = joint("b", "revolute", "l1", "l2", 'xyz="1 0 0"', "0 1 0", limit() + rule_of_b)
+    return urdfkin.load(urdfs.robot(a, b), verify=False)
 
 
 @pytest.mark.filterwarnings("ignore:.*URDF527")
 def test_a_leader_of_one_model_may_be_a_mimic_joint_of_the_other() -> None:
-    leads, follows = (
-        '<mimic joint="b" multiplier="0.5" offset="-0.05"/>',
-        '<mimic joint="a" multiplier="2" offset="0.1"/>',
-    )
-    a, b = (urdfkin.load(ARM.format(*words), verify=False) for words in (("", follows), (leads, "")))
+    a, b = arm_with(rule_of_b=mimic("a", 2, 0.1)), arm_with(mimic("b", 0.5, -0.05))
     found = urdfkin.same(a, b, bounds=False)
     conversion = a.convention(found.convention())
     assert conversion.joint_names == ("b",)
@@ -427,7 +401,7 @@ def test_a_leader_of_one_model_may_be_a_mimic_joint_of_the_other() -> None:
 
 
 def test_a_coordinate_of_one_model_only_is_an_error_that_names_its_joint() -> None:
-    a, b = (urdfkin.load(ARM.format("", ""), verify=False) for _ in "ab")
+    a, b = arm_with(), arm_with()
     shorter = urdfkin.load(b.urdf.replace('name="b" type="revolute"', 'name="b" type="fixed"'), verify=False)
     with pytest.raises(InputError, match=r"a joint of B has no joint of A.*found b"):
         urdfkin.same(shorter, b, bounds=False).convention()
@@ -436,39 +410,23 @@ def test_a_coordinate_of_one_model_only_is_an_error_that_names_its_joint() -> No
 
 
 def test_a_free_joint_with_another_frame_is_an_error() -> None:
-    text = '<robot name="r"><link name="l0"/><link name="l1"/><joint name="f" type="floating">'
-    text += '<parent link="l0"/><child link="l1"/><origin xyz="{} 0 0"/></joint></robot>'
-    a, b = (urdfkin.load(text.format(x), verify=False) for x in (0, 1))
+    texts = (urdfs.robot(joint("f", "floating", "l0", "l1", f'xyz="{x} 0 0"', "")) for x in (0, 1))
+    a, b = (urdfkin.load(text, verify=False) for text in texts)
     with pytest.raises(InputError, match="a free joint has another frame in B"):
         urdfkin.same(a, b, bounds=False).convention()
 
 
 def test_the_command_writes_a_map_that_other_commands_read(tmp_path: Path) -> None:
     a, b = pair("ur5"), loaded(disguised(pair("ur5").tree, 3))
-    files = [tmp_path / name for name in ("a.urdf", "b.urdf", "map.toml")]
-    for file, one in zip(files, (a, b), strict=False):
-        file.write_text(one.urdf)
-    done = run("same", *map(str, files[:2]), "--boxes", "0", "--write-map", str(files[2]))
-    assert done.code == 0, done.err
-    q = a.sample(1)[0]
-    theirs = urdfkin.same(a, b, bounds=False).to_b(q)
-    text = ",".join(map(repr, theirs.tolist()))
-    frame = a.link_names[-1]
-    done = run(
-        "placement",
-        str(files[0]),
-        "--convention",
-        str(files[2]),
-        "--frame",
-        frame,
-        "--q",
-        text,
-        "--format",
-        "json",
-    )
-    assert done.code == 0, done.err
+    files = one, other, found = [str(tmp_path / name) for name in ("a.urdf", "b.urdf", "map.toml")]
+    for file, robot in zip(files, (a, b), strict=False):
+        Path(file).write_text(robot.urdf)
+    good("same", one, other, "--boxes", "0", "--write-map", found)
+    q, frame = a.sample(1)[0], a.link_names[-1]
+    text = ",".join(map(repr, urdfkin.same(a, b, bounds=False).to_b(q).tolist()))
+    done = good("placement", one, "--convention", found, "--frame", frame, "--q", text, "--format", "json")
     assert np.allclose(done.data["result"][0], a.placement(q, frame), 0, 1e-14)
-    order = run("order", str(files[0]), "--to", str(files[2])).text
+    order = good("order", one, "--to", found).text
     assert "q_to = q_from[..., [" in order or "np.array" in order
 
 

@@ -20,7 +20,7 @@ import urdfkin
 from tests.model.conventions.libraries import LIBRARIES, Library
 from urdfkin.kinematics.roundings import ROUNDINGS
 from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.conventions import Conversion, find_convention
+from urdfkin.model.conventions import Convention, Conversion, find_convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -55,12 +55,8 @@ def _differences(
         plan = robot.plan([robot.tree.link_index(link)])
         size = magnitudes(plan, q[None], v[None], None, STILL_STATE)
         reach = _farthest_mass(robot, q) if library.at_mass else 0.0
-        size = replace(
-            size,
-            p=size.p + reach,
-            vel=size.vel + size.w * reach,
-            roundings=size.roundings * library.roundings / ROUNDINGS,
-        )
+        roundings = size.roundings * library.roundings / ROUNDINGS
+        size = replace(size, p=size.p + reach, vel=size.vel + size.w * reach, roundings=roundings)
         for quantity, theirs, ours in (
             (PLACEMENT, T, robot.placement(q, frame)),
             (VELOCITY, conversion.six(twist), robot.velocity(q, v, frame)),
@@ -73,10 +69,8 @@ def _differences(
 
 def _farthest_mass(robot: Robot, q: FloatArray) -> float:
     """Return an upper bound of the distance of all centres of mass from the root and from their links."""
-    masses = [
-        [float(x) for x in origin.get("xyz", "0 0 0").split()]
-        for origin in plain_xml(robot.urdf).iterfind("link/inertial/origin")
-    ]
+    origins = plain_xml(robot.urdf).iterfind("link/inertial/origin")
+    masses = [[float(x) for x in origin.get("xyz", "0 0 0").split()] for origin in origins]
     places = robot.placement(q, robot.link_frames)[:, :3, 3]
     return float(np.linalg.norm(places, axis=-1).max() + np.linalg.norm(masses or [[0.0] * 3], axis=-1).max())
 
@@ -96,9 +90,7 @@ def _conversion(robot: Robot, name: str, library: Library, **changes: Any) -> Co
     ("name", "robot_name"),
     [(name, OTHERS.get((name, robot), robot)) for name in LIBRARIES for robot in ROBOTS],
 )
-def test_a_librarys_own_results_in_its_convention_are_ours(
-    name: str, robot_name: str, tmp_path: Path
-) -> None:
+def test_a_librarys_own_results_in_its_convention_are_ours(name: str, robot_name: str, tmp_path: Any) -> None:
     robot = _loaded(robot_name, name)
     library = LIBRARIES[name](robot, tmp_path)
     conversion = _conversion(robot, name, library)
@@ -107,32 +99,28 @@ def test_a_librarys_own_results_in_its_convention_are_ours(
         assert (found <= bound).all()
 
 
-#: Mistakes in a convention that has a floating base.
-MISTAKES: dict[str, dict[str, Any]] = {
-    "quaternion": {"xyzw": {"quaternion": "wxyz"}, "wxyz": {"quaternion": "xyzw"}},
-    "six": {"linear first": {"six": "angular first"}, "angular first": {"six": "linear first"}},
-    "linear": {"body": {"linear": "parent"}, "parent": {"linear": "body"}},
-    "angular": {"body": {"angular": "parent"}, "parent": {"angular": "body"}},
-    "base_v": {"linear first": {"base_v": "angular first"}, "angular first": {"base_v": "linear first"}},
-    "base_q": {
-        "position first": {"base_q": "quaternion first"},
-        "quaternion first": {"base_q": "position first"},
-    },
-    "point": {"origin": {"point": "centre of mass"}, "centre of mass": {"point": "origin"}},
-    "angle": {"rad": {"angle": "deg"}, "deg": {"angle": "rad"}},
-}
+#: The two values of what a convention with a floating base states: a mistake is the other one.
+STATED = {
+    "quaternion": ("xyzw", "wxyz"), "six": ("linear first", "angular first"), "linear": ("body", "parent"),
+    "angular": ("body", "parent"), "base_v": ("linear first", "angular first"), "angle": ("rad", "deg"),
+    "base_q": ("position first", "quaternion first"), "point": ("origin", "centre of mass"),
+}  # fmt: skip
+
+
+def mistaken(right: Convention, field: str) -> dict[str, Any]:
+    """The change of a convention that is a mistake."""
+    return {field: next(value for value in STATED[field] if value != getattr(right, field))}
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize("mistake", STATED)
 @pytest.mark.parametrize("name", LIBRARIES)
 def test_a_planted_mistake_in_a_convention_is_found(name: str, mistake: str, tmp_path: Path) -> None:
     if name == "rtb" and mistake not in ("six", "angle"):  # it has no floating joint
         return
     robot = _loaded("go2" if mistake == "point" else "a1", name)  # the A1's base has its mass at the origin
     library = LIBRARIES[name](robot, tmp_path)
-    right = find_convention(name)
-    wrong = _conversion(robot, name, library, **MISTAKES[mistake][getattr(right, mistake)])
+    wrong = _conversion(robot, name, library, **mistaken(find_convention(name), mistake))
     assert _worst(robot, library, wrong) > 1e-3
 
 

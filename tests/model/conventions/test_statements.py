@@ -12,8 +12,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import urdfkin
+from tests import urdfs
 from tests.model.conventions.libraries import LIBRARIES
-from tests.model.conventions.test_libraries import MISTAKES
+from tests.model.conventions.test_libraries import STATED, mistaken
+from tests.urdfs import joint
 from urdfkin.model.conventions import BUILT_IN, Convention, find_convention
 from urdfkin.robot import Robot
 
@@ -22,14 +24,8 @@ Rows = list[tuple[str, str, str]]
 
 def _rows(robot: Robot) -> Rows:
     """Return name, parent and child of each joint in the order of the file."""
-
-    def link(joint: ElementTree.Element, end: str) -> str:
-        found = joint.find(end)
-        assert found is not None
-        return found.get("link", "")
-
-    joints = ElementTree.fromstring(robot.urdf).iterfind("joint")
-    return [(joint.get("name", ""), link(joint, "parent"), link(joint, "child")) for joint in joints]
+    joints: Any = ElementTree.fromstring(robot.urdf).iterfind("joint")
+    return [(x.get("name"), x.find("parent").get("link"), x.find("child").get("link")) for x in joints]
 
 
 def _depth_first(rows: Rows, link: str) -> list[str]:
@@ -113,7 +109,7 @@ def test_a_convention_agrees_with_its_sources(name: str) -> None:
     assert _wrong(find_convention(name)) == []
 
 
-@pytest.mark.parametrize("mistake", [*MISTAKES, "order"])
+@pytest.mark.parametrize("mistake", [*STATED, "order"])
 @pytest.mark.parametrize("name", ORDERS)
 def test_a_planted_mistake_contradicts_them(name: str, mistake: str) -> None:
     right = find_convention(name)
@@ -125,8 +121,7 @@ def test_a_planted_mistake_contradicts_them(name: str, mistake: str) -> None:
     elif name == "kdl" and mistake in ("quaternion", "linear", "angular", "base_v", "base_q", "point"):
         return
     else:
-        changes: dict[str, Any] = MISTAKES[mistake][getattr(right, mistake)]
-        wrong = replace(right, **changes)
+        wrong = replace(right, **mistaken(right, mistake))
     assert _wrong(wrong)
 
 
@@ -177,13 +172,11 @@ def _humanoid(leg: str, arm: str) -> str:
     chains = [("pelvis", [f"{side}_{part}" for part in leg.split()]) for side in SIDES[::-1]]
     chains.append(("pelvis", ["torso"]))
     chains += [("torso_link", [f"{side}_{part}" for part in arm.split()]) for side in SIDES[::-1]]
-    text = '<link name="pelvis"/>'
-    for parent, joints in chains:
-        for joint in joints:
-            text += f'<link name="{joint}_link"/><joint name="{joint}" type="continuous"><axis xyz="0 0 1"/>'
-            text += f'<parent link="{parent}"/><child link="{joint}_link"/></joint>'
-            parent = f"{joint}_link"  # noqa: PLW2901
-    return f'<robot name="humanoid">{text}</robot>'
+    joints = []
+    for root, names in chains:
+        parents = [root, *(f"{name}_link" for name in names[:-1])]
+        joints += [joint(x, "continuous", at, f"{x}_link") for x, at in zip(names, parents, strict=True)]
+    return urdfs.robot(*joints)
 
 
 H1_URDF = _humanoid(
@@ -198,15 +191,11 @@ H1_2_URDF = _humanoid(
 @pytest.mark.parametrize(
     ("robot", "convention", "published"),
     [
-        ("anymal_c", "isaaclab", ANYMAL),
-        ("anymal_c", "isaacgym", ANYMAL_GYM),
-        ("go2", "isaaclab", GO2),
-        (H1_URDF, "isaaclab", H1),
-        (H1_2_URDF, "isaaclab", H1_2),
-        ("panda", "isaaclab", PANDA),
+        ("anymal_c", "isaaclab", ANYMAL), ("anymal_c", "isaacgym", ANYMAL_GYM), ("go2", "isaaclab", GO2),
+        (H1_URDF, "isaaclab", H1), (H1_2_URDF, "isaaclab", H1_2), ("panda", "isaaclab", PANDA),
     ],
     ids=["anymal_c", "anymal_c isaacgym", "go2", "h1", "h1_2", "panda"],
-)
+)  # fmt: skip
 def test_the_order_is_the_published_one(robot: str, convention: str, published: list[str]) -> None:
     loaded = urdfkin.load(robot, verify=False)
     assert list(loaded.convention(convention).joint_names) == published
@@ -237,14 +226,9 @@ def test_the_g1_has_the_published_permutation_from_mujoco_to_isaac_lab() -> None
 
 
 def test_a_fixed_joint_counts_as_a_level_only_if_the_importer_keeps_it() -> None:
-    text = """<robot name="r"><link name="base"/><link name="flange"/>
-    <link name="x"/><link name="y"/><link name="z"/>
-    <joint name="mount" type="fixed"><parent link="base"/><child link="flange"/></joint>
-    <joint name="a" type="continuous"><parent link="flange"/><child link="x"/><axis xyz="0 0 1"/></joint>
-    <joint name="b" type="continuous"><parent link="base"/><child link="y"/><axis xyz="0 0 1"/></joint>
-    <joint name="c" type="continuous"><parent link="y"/><child link="z"/><axis xyz="0 0 1"/></joint>
-    </robot>"""
-    robot = urdfkin.load(text, verify=False)
+    ends = {"a": ("flange", "x"), "b": ("base", "y"), "c": ("y", "z")}
+    turning = (joint(name, "continuous", *links) for name, links in ends.items())
+    robot = urdfkin.load(urdfs.robot(joint("mount", "fixed", "base", "flange"), *turning), verify=False)
     kept = replace(find_convention("isaaclab"), order="breadth first, with fixed joints")
     assert robot.convention("isaaclab").joint_names == ("a", "b", "c")
     assert robot.convention(kept).joint_names == ("b", "c", "a")

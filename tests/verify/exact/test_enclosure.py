@@ -3,7 +3,6 @@
 import io
 import re
 import sys
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import redirect_stdout
 from fractions import Fraction
@@ -56,14 +55,8 @@ def moving_base(seed: int) -> BaseMotion:
     return BaseMotion(T, generator.normal(size=6), generator.normal(size=6))
 
 
-def quantities(enclosed: Enclosures) -> Iterator[Enclosure]:
-    yield from (
-        enclosed.placement,
-        enclosed.velocity,
-        enclosed.acceleration,
-        enclosed.jacobian,
-        enclosed.jacobian_rate,
-    )
+def quantities(x: Enclosures) -> tuple[Enclosure, ...]:
+    return x.placement, x.velocity, x.acceleration, x.jacobian, x.jacobian_rate
 
 
 def holds(enclosure: Enclosure, true: NDArray[np.object_]) -> bool:
@@ -140,25 +133,23 @@ def test_pinocchios_doubles_are_those_that_it_is_asked_for(base: BaseMotion | No
     enclosed = robot.enclose(*x, frame, "world", base=base)
     asked = QueryBatch([frame], tuple(row[np.newaxis] for row in x), Reference.WORLD, base)
     oracle = robot.verifier.oracle(base)
-    expected = oracle.accelerations(asked)[0, 0]
-    assert (enclosed.acceleration.pinocchio == expected).all()
+    assert (enclosed.acceleration.pinocchio == oracle.accelerations(asked)[0, 0]).all()
     assert (enclosed.placement.pinocchio == oracle.placements(asked)[0, 0]).all()
 
 
+#: Equation -> a term of it, and the quantity that it computes.
+SLIPS = {
+    "centripetal": ("cross(w, cross(w, d))", "acceleration"),
+    "angular_acceleration": ("times(v, cross(w, z))", "acceleration"),
+    "turning_column": ("cross(z, d)", "jacobian"),
+    "turning_column_rate": ("cross(z, d_rate)", "jacobian rate"),
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("equation", "term", "quantity"),
-    [
-        ("centripetal", "cross(w, cross(w, d))", "acceleration"),
-        ("angular_acceleration", "times(v, cross(w, z))", "acceleration"),
-        ("turning_column", "cross(z, d)", "jacobian"),
-        ("turning_column_rate", "cross(z, d_rate)", "jacobian rate"),
-    ],
-)
-def test_what_an_equation_gives_that_is_slightly_wrong_leaves_the_interval(
-    equation: str, term: str, quantity: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    robot = robot_of("panda")
+@pytest.mark.parametrize("equation", SLIPS)
+def test_wrong_equations_leave_the_interval(equation: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, (term, quantity) = robot_of("panda"), SLIPS[equation]
     x, frame = sample(robot), robot.tip_frame
     monkeypatch.setattr(recursion._RECURSION, "eq", with_a_slip(equation, term))
     for one in quantities(robot.enclose(*x, frame, digits=15)):
@@ -239,14 +230,11 @@ FOLLOWERS = urdfs.robot(
 def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipliers(
     reference: Reference,
 ) -> None:
-    robot = urdfkin.load(FOLLOWERS)
-    q, v, a = np.array([0.3]), np.array([1.0]), np.array([0.5])
-    one = present(robot.enclose(q, v, a, "d", reference, hessian=True).hessian)
-    assert one.error(robot.hessian(q, "d", reference)).max() < 1e-14
+    robot, x = urdfkin.load(FOLLOWERS), (np.array([0.3]), np.array([1.0]), np.array([0.5]))
+    one = present(robot.enclose(*x, "d", reference, hessian=True).hessian)
+    assert one.error(robot.hessian(x[0], "d", reference)).max() < 1e-14
     # The rate of the Jacobian by the robot's own recursion: with one rate, J-dot = H v.
-    motion = true_motion(robot, (q, v, a))
-    link = robot.tree.frame_link("d")
-    rate = QUANTITIES["jacobian rate"].truth(motion, link, reference)
+    rate = QUANTITIES["jacobian rate"].truth(true_motion(robot, x), robot.tree.frame_link("d"), reference)
     assert np.abs((one.lower[..., 0] - rate).astype(float)).max() < 1e-15
 
 
@@ -316,5 +304,4 @@ def test_the_example_on_the_page_runs_and_prints_what_stands_there() -> None:
     with redirect_stdout(io.StringIO()) as out:
         exec(code, names)
     # How many of urdfkin's own lie inside is a matter of last digits.
-    own = re.compile(r"\d+ of urdfkin's")
-    assert own.sub("", out.getvalue()) == own.sub("", printed)
+    assert re.sub(r"\d+ of urdfkin's", "", out.getvalue()) == re.sub(r"\d+ of urdfkin's", "", printed)

@@ -26,9 +26,8 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 
 def true_ends(x: Any) -> tuple[Fraction, Fraction]:
     """The ends of a ball, without rounding."""
-    middle, radius = (
-        Fraction(int(man)) * Fraction(2) ** int(exp) for man, exp in (x.mid().man_exp(), x.rad().man_exp())
-    )
+    numbers = (each.man_exp() for each in (x.mid(), x.rad()))
+    middle, radius = (Fraction(int(man)) * Fraction(2) ** int(exp) for man, exp in numbers)
     return middle - radius, middle + radius
 
 
@@ -120,11 +119,10 @@ def test_the_nearest_rotation_lies_in_its_intervals(digits: int, R: FloatArray, 
     M = R + off.uniform(-5e-10, 5e-10, (3, 3))
     found, expected = nearest(M, digits), orthogonal_factor(M)
     room = Fraction(10) ** -57  # what the 60 digits of mpmath may be off by
-    for i in range(3):
-        for j in range(3):
-            low, high = true_ends(found[i][j])
-            assert low - room <= fraction(expected[i, j]) <= high + room
-            assert high - low < Fraction(10) ** (1 - digits)
+    for i, j in np.ndindex(3, 3):
+        low, high = true_ends(found[i][j])
+        assert low - room <= fraction(expected[i, j]) <= high + room
+        assert high - low < Fraction(10) ** (1 - digits)
 
 
 def test_what_newtons_steps_leave_is_in_the_intervals_of_the_nearest_rotation() -> None:
@@ -142,15 +140,11 @@ def test_what_newtons_steps_leave_is_in_the_intervals_of_the_nearest_rotation() 
 
 def test_a_rotation_is_its_own_nearest_without_width() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    assert [[true_ends(number) for number in row] for row in nearest(turn, 15)] == [
-        [(Fraction(number), Fraction(number)) for number in row] for row in turn.tolist()
-    ]
+    for row, right in zip(nearest(turn, 15), turn.tolist(), strict=True):
+        assert [true_ends(number) for number in row] == [(number, number) for number in right]
 
 
-numerators = st.integers(-(2**200), 2**200)
-
-
-@given(numerators, st.integers(-1400, 1100))
+@given(st.integers(-(2**200), 2**200), st.integers(-1400, 1100))
 def test_doubles_around_an_interval_lie_outside_it_and_next_to_it(man: int, exponent: int) -> None:
     with precision(120):
         low, high = ends(arb((man, exponent)))

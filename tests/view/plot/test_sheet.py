@@ -63,13 +63,10 @@ def test_q_and_v_are_drawn_with_their_limits_one_unit_an_axis(case: Case) -> Non
     assert [drawn.get_label() for drawn in angles] == list(robot.coordinate_names[:7])
     for k, drawn in enumerate(angles):
         np.testing.assert_array_equal(drawn.get_ydata(), trajectory.q[:, k])
-    for one, bounds in zip(
-        axes, (*_of(robot.limits), *_of([-robot.velocity_limits, robot.velocity_limits])), strict=False
-    ):
-        thin = {
-            float(np.asarray(drawn.get_ydata())[0]) for drawn in one.lines if drawn.get_linewidth() == 0.6
-        }
-        assert thin == bounds
+    limits = (*_of(robot.limits), *_of([-robot.velocity_limits, robot.velocity_limits]))
+    for one, bounds in zip(axes, limits, strict=False):
+        thin = (drawn for drawn in one.lines if drawn.get_linewidth() == 0.6)
+        assert {float(np.asarray(drawn.get_ydata())[0]) for drawn in thin} == bounds
 
 
 def _of(bounds: Any) -> tuple[set[float], set[float]]:
