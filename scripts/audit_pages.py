@@ -39,7 +39,7 @@ from selenium.webdriver.common.keys import Keys
 import urdfkin
 from tests.report.browser import Browser, opened
 from tests.report.documents import months_runs
-from urdfkin.comparison.result import Question
+from urdfkin.comparison.result import SameQuestion
 from urdfkin.comparison.verdict import same
 from urdfkin.report.history import as_html as history_page
 from urdfkin.report.history import history
@@ -187,7 +187,7 @@ def fleet_pages(folder: Path) -> Iterator[Page]:
 def comparison(b: str, within: float | None) -> str:
     """Return the page that compares the UR5 with another robot."""
     robots = urdfkin.load("ur5"), urdfkin.load(b)
-    return same_page(same(*robots, within=within), robots, Question(within))
+    return same_page(same(*robots, within=within), robots, SameQuestion(within))
 
 
 def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:

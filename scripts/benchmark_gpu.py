@@ -41,7 +41,7 @@ import urdfkin
 from scripts.benchmarking.contenders import positions
 from scripts.pages import table as markdown
 from urdfkin.export import QUANTITIES, write
-from urdfkin.export.code import Code
+from urdfkin.export.code import FrameCode
 from urdfkin.export.forms import code_of_robot
 from urdfkin.export.function import Function
 from urdfkin.robot import Robot
@@ -76,12 +76,12 @@ def gpus() -> int:
     return count.value if found else 0
 
 
-def bytes_of(code: Code, function: Function, real: str) -> int:
+def bytes_of(code: FrameCode, function: Function, real: str) -> int:
     """Return the number of bytes that one configuration reads and writes."""
     return _BYTES[real] * (sum(code.widths(function).values()) + len(function.results))
 
 
-def program(code: Code) -> str:
+def program(code: FrameCode) -> str:
     """Return the text of the program that prints one JSON line for each measurement."""
     measured = "\n".join(
         _filled(_MEASURED, name=f.name, title=code.name, given=", ".join(f.inputs)) for f in code.functions
@@ -105,7 +105,7 @@ def _filled(text: str, **values: object) -> str:
     return text
 
 
-def compiled(code: Code, folder: Path, compiler: str) -> dict[str, Path]:
+def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
     """Compile the program and the checks in both precisions; return the paths."""
     header, source = folder / f"{code.name}.cuh", folder / "measure.cu"
     header.write_text(write(code, "cuda"), encoding="utf-8")
@@ -122,7 +122,7 @@ def compiled(code: Code, folder: Path, compiler: str) -> dict[str, Path]:
     return found
 
 
-def rows(code: Code, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
+def rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
     """Yield the measurements, with configurations per second and the fraction of the memory bandwidth.
 
     Raises:
@@ -148,7 +148,7 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
     return markdown(heads, rows, left=3)
 
 
-def of_torch(robot: Robot, frame: str, code: Code, device: str = "cuda") -> Iterator[str]:
+def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
     """Yield the measurements of PyTorch's export, and of PyTorch Kinematics, as JSON lines.
 
     There are none without PyTorch and its device.

@@ -42,7 +42,7 @@ import urdfkin
 from scripts.benchmarking.subject import chain_urdf
 from scripts.pages import DOCS, inserted, table
 from urdfkin.export import LANGUAGES, QUANTITIES, code_in, write
-from urdfkin.export.code import Code
+from urdfkin.export.code import FrameCode
 from urdfkin.export.forms import code_of_robot
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
@@ -64,12 +64,12 @@ _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
 
-def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> Code:
+def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> FrameCode:
     """Return the verified code of a frame."""
     return code_of_robot(robot, frame, quantities, "local_world_aligned", verify=True)
 
 
-def shares(written: Code, folder: Path, ways: Collection[str]) -> Iterator[tuple[str, float]]:
+def shares(written: FrameCode, folder: Path, ways: Collection[str]) -> Iterator[tuple[str, float]]:
     """Yield, for each way to run the code, the largest error as a fraction of its bound."""
     for to, suffix, compilers, strict in _COMPILED:
         source, name = folder / f"robot{suffix}", written.name.upper()

@@ -39,7 +39,7 @@ from urdfkin.urdf.findings import WRITTEN_OUT, shortened
 from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.pages import page as page_of
-from urdfkin.validation.accuracy import Judgement, Line, judge
+from urdfkin.validation.accuracy import AccuracyLine, Judgement, judge
 from urdfkin.validation.document import VALIDATION
 from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
 from urdfkin.verify.pinocchio import version
@@ -212,7 +212,7 @@ the same double. The median ratio of urdfkin's typical error to Pinocchio's is
     return {"counts": counts, "tables": "\n\n".join(sections)}
 
 
-def _errors(lines: tuple[Line, ...]) -> str:
+def _errors(lines: tuple[AccuracyLine, ...]) -> str:
     sides = [f"{side} {error}" for error in ("worst", "typical") for side in ("urdfkin", "Pinocchio")]
     rows = [
         (

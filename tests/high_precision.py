@@ -18,7 +18,7 @@ from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.recursion import State
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import numbers
-from urdfkin.verify.exact.recursion import Motion, move
+from urdfkin.verify.exact.recursion import ExactMotion, move
 
 #: Work with this many digits wherever `mp` is used.
 mp = mpmath.mp.clone()
@@ -87,7 +87,7 @@ def angular_acceleration(R: Callable[[Any], Matrix], t: float) -> Matrix:
 # -- the true motion of a robot, without Arb ------------------------------------------------------------
 
 
-def true_motion(robot: Robot, x: Sequence[FloatArray], base: BaseMotion | None = None) -> Motion:
+def true_motion(robot: Robot, x: Sequence[FloatArray], base: BaseMotion | None = None) -> ExactMotion:
     """The motion of one sample by the same recursion, on mpmath's numbers instead of balls."""
     with patch.object(numbers, "arb", mp.mpf):
         joints, on = numbers.read_exact(robot.urdf, robot.tree), None if base is None else root_state(base)

@@ -1,11 +1,13 @@
 """Imports follow docs/architecture.toml: one direction, no cycle, one importer per foreign library."""
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+import urdfkin
 from scripts.make_architecture import (
     IMPORTERS,
     PACKAGES,
@@ -98,3 +100,17 @@ def test_importing_the_package_or_asking_for_help_loads_nothing_heavy() -> None:
         script = f"import sys; {code}; print(sorted({heavy} & set(sys.modules)))"
         done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
         assert done.stdout.strip().endswith("[]"), code
+
+
+#: Two kinds of numbers have these classes: numbers in Python, and numbers in a compiled kernel.
+TWICE = {"Known", "Product"}
+
+
+def test_a_class_name_stands_for_one_thing() -> None:
+    found = [
+        node.name
+        for path in Path(urdfkin.__file__).parent.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.ClassDef)
+    ]
+    assert {name for name in found if found.count(name) > 1} == TWICE

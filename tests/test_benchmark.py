@@ -22,7 +22,7 @@ from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, bar
 from scripts.benchmarking.tables import tables
 from scripts.benchmarking.timing import Calls, DifferenceError, Table, Work, agree, measure
 from tests.urdfs import joint, robot
-from urdfkin.compiled.plan import Step, program_of
+from urdfkin.compiled.plan import StepField, program_of
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
@@ -107,7 +107,7 @@ def test_a_library_or_a_program_that_is_missing_is_listed_and_left_out() -> None
 def test_the_path_written_out_for_a_robot_has_its_jacobian_and_acceleration(name: str, frame: str) -> None:
     with Subject(name, frame, 1) as subject:
         q, v, a = subject.q[0], subject.v[0], subject.a[0]
-        of_q, of_v = (subject.plan.steps[:, place] for place in (Step.Q, Step.V))
+        of_q, of_v = (subject.plan.steps[:, place] for place in (StepField.Q, StepField.V))
         x, rates = q[of_q].tolist(), (v[of_v].tolist(), a[of_v].tolist())
         numbers = [np.sin(x).tolist(), np.cos(x).tolist(), *rates]
         J = np.reshape(generated.results(subject.plan, "jacobian", x, *numbers), (6, subject.nv))

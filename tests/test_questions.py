@@ -17,7 +17,7 @@ from tests.cli.running import urdfkin as run
 from tests.pages import DOCS
 from tests.urdfs import joint, limit, mimic
 from urdfkin.cli.explain import answer_to, answers, as_text
-from urdfkin.errors import Question, UrdfkinError
+from urdfkin.errors import QuestionsSection, UrdfkinError
 from urdfkin.urdf import xacro
 from urdfkin.verify.pinocchio import _impostor
 
@@ -34,7 +34,7 @@ def _without_xacrodoc() -> object:
         return xacro.expand(Path(__file__), {})
 
 
-AXES = Question.AXES.value
+AXES = QuestionsSection.AXES.value
 
 
 def _typed(*words: str) -> Callable[[], str]:
@@ -69,54 +69,54 @@ def _warned(act: Callable[[], object]) -> str:
 
 
 #: What leads to each question: a message or a page.
-ASKED: dict[Question, list[Callable[[], str]]] = {
-    Question.REFERENCE_FRAMES: [
+ASKED: dict[QuestionsSection, list[Callable[[], str]]] = {
+    QuestionsSection.REFERENCE_FRAMES: [
         _raised(lambda: _ur5().jacobian(np.zeros(6), "tool0", "body")),
         _typed("jacobian", "ur5", "--reference", "body"),
     ],
-    Question.TWO_ACCELERATIONS: [_typed("acceleration", "--help")],
-    Question.JOINT_ORDER: [
+    QuestionsSection.TWO_ACCELERATIONS: [_typed("acceleration", "--help")],
+    QuestionsSection.JOINT_ORDER: [
         _raised(lambda: _ur5().jacobian(np.zeros(7))),
         _raised(lambda: _ur5().jacobian("1, 2, 3")),
         _typed("info", "talos"),
     ],
-    Question.CONTINUOUS_JOINTS: [
+    QuestionsSection.CONTINUOUS_JOINTS: [
         _raised(lambda: _wheel().from_pinocchio([0.3, 0.3, 0.6])),
         _raised(lambda: _wheel().from_pinocchio([0.3])),
         _raised(lambda: _wheel().placement([1.0, 0.0, 0.5])),
     ],
-    Question.MIMIC_JOINTS: [
+    QuestionsSection.MIMIC_JOINTS: [
         _raised(lambda: _wheel().from_pinocchio([1.0, 0.0, 0.5])),
         _raised(lambda: _wheel().placement({"axle": 1.0, "cap": 2.0})),
         _raised(lambda: urdfkin.load("panda").placement(np.zeros(9))),
         _typed("explain", "mimic-loop"),
     ],
-    Question.PACKAGES_AND_MESHES: [
+    QuestionsSection.PACKAGES_AND_MESHES: [
         _raised(lambda: urdfkin.load("package://nowhere/arm.urdf")),
         _typed("explain", "URDF706"),
     ],
-    Question.URDF_TO_DH: [_typed("dh", "--help")],
-    Question.WHICH_DH_CONVENTION: [_raised(lambda: _ur5().dh(convention="classic"))],
-    Question.DH_AND_URDF_DISAGREE: [
+    QuestionsSection.URDF_TO_DH: [_typed("dh", "--help")],
+    QuestionsSection.WHICH_DH_CONVENTION: [_raised(lambda: _ur5().dh(convention="classic"))],
+    QuestionsSection.DH_AND_URDF_DISAGREE: [
         _typed("dh", "ur10", "--compare", "ur5"),
         _raised(lambda: urdfkin.load("ur10").dh("tool0", "base", like=_ur5().dh("tool0", "base"))),
     ],
-    Question.UNKNOWN_FRAMES: [_raised(lambda: _ur5().placement(np.zeros(6), "tol0"))],
-    Question.ROW_ORDER: [_raised(lambda: urdfkin.BaseMotion(velocity=np.zeros(3)))],
-    Question.FIXED_JOINTS: [_raised(lambda: _ur5().placement("neutral, ee_fixed_joint=1"))],
-    Question.WRONG_PINOCCHIO: [_raised(lambda: _raise(_impostor(np)))],
-    Question.AXES: [_typed("explain", "axis-not-unit")],
-    Question.XACRO: [_raised(_without_xacrodoc), _typed("explain", "unexpanded-xacro")],
-    Question.GRAVITY: [_typed("acceleration", "--help"), _typed("imu", "--help")],
-    Question.FLOATING_BASES: [
+    QuestionsSection.UNKNOWN_FRAMES: [_raised(lambda: _ur5().placement(np.zeros(6), "tol0"))],
+    QuestionsSection.ROW_ORDER: [_raised(lambda: urdfkin.BaseMotion(velocity=np.zeros(3)))],
+    QuestionsSection.FIXED_JOINTS: [_raised(lambda: _ur5().placement("neutral, ee_fixed_joint=1"))],
+    QuestionsSection.WRONG_PINOCCHIO: [_raised(lambda: _raise(_impostor(np)))],
+    QuestionsSection.AXES: [_typed("explain", "axis-not-unit")],
+    QuestionsSection.XACRO: [_raised(_without_xacrodoc), _typed("explain", "unexpanded-xacro")],
+    QuestionsSection.GRAVITY: [_typed("acceleration", "--help"), _typed("imu", "--help")],
+    QuestionsSection.FLOATING_BASES: [
         _raised(lambda: urdfkin.load(WHEEL, root_joint="floating").placement({"root_joint": np.zeros(6)}))
     ],
-    Question.LOCKED_JOINTS: [
+    QuestionsSection.LOCKED_JOINTS: [
         _raised(lambda: urdfkin.load("panda").locked("ready")),
         _raised(lambda: _ur5().locked({"elbow_joint": 1.0}).placement({"elbow_joint": 1.0})),
     ],
-    Question.DEGREES: [lambda: _warned(lambda: _ur5().integrate(np.full(6, 40.0), np.zeros(6)))],
-    Question.SINGULARITY: [_typed("singular-values", "--help")],
+    QuestionsSection.DEGREES: [lambda: _warned(lambda: _ur5().integrate(np.full(6, 40.0), np.zeros(6)))],
+    QuestionsSection.SINGULARITY: [_typed("singular-values", "--help")],
 }
 
 
@@ -125,8 +125,10 @@ def _raise(error: Exception) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("question", Question, ids=lambda question: question.value)
-def test_what_people_stumble_over_leads_to_a_section_that_stands_on_the_page(question: Question) -> None:
+@pytest.mark.parametrize("question", QuestionsSection, ids=lambda question: question.value)
+def test_what_people_stumble_over_leads_to_a_section_that_stands_on_the_page(
+    question: QuestionsSection,
+) -> None:
     for told in ASKED[question]:
         assert f"`urdfkin explain {question.value}`" in " ".join(told().split()).replace("- ", "-")
     text = good("explain", question.value).text

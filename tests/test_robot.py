@@ -25,7 +25,7 @@ from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.robot import _INSIDE, Robot
 from urdfkin.verify import verifier
-from urdfkin.verify.certificate import Comparison
+from urdfkin.verify.certificate import BatchComparison
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import PinocchioOracle
 from urdfkin.verify.quantities import QUANTITIES, Quantity
@@ -178,7 +178,7 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
     monkeypatch: pytest.MonkeyPatch, panda: Robot
 ) -> None:
     # An infinite disagreement with an infinite bound: of the two parts of a check, either may be such a one.
-    wrong, right = Comparison(1, np.inf, np.nan, (0, 0)), Comparison(1, 1.0, 0.5, (0, 0))
+    wrong, right = BatchComparison(1, np.inf, np.nan, (0, 0)), BatchComparison(1, 1.0, 0.5, (0, 0))
     for results in ([wrong], [wrong, right], [right, wrong]):
         found = iter(results)
         monkeypatch.setattr(verifier, "compare", lambda *_, found=found: next(found))

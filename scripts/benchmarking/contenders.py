@@ -19,7 +19,7 @@ import pinocchio as pin
 from scripts.benchmarking import generated
 from scripts.benchmarking.subject import QUANTITIES, Subject, bare_urdf
 from scripts.benchmarking.timing import Calls, Work
-from urdfkin.compiled.plan import Step
+from urdfkin.compiled.plan import StepField
 from urdfkin.kinematics.arithmetic import bound
 from urdfkin.model.tree import FloatArray
 
@@ -458,7 +458,7 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
         transposed=lambda R: array(R).T,
         product=lambda R, S: array(R) @ array(S),
     )
-    places_q, places_v = plan.steps[:, Step.Q], plan.steps[:, Step.V]
+    places_q, places_v = plan.steps[:, StepField.Q], plan.steps[:, StepField.V]
 
     def compute(q: Any, *rates: Any) -> Any:
         x = q[places_q]

@@ -23,7 +23,7 @@ import numpy as np
 from scripts.benchmarking.subject import Subject
 from scripts.benchmarking.timing import Work
 from urdfkin.compiled import python_numbers
-from urdfkin.compiled.plan import CompiledTree, Motion, Step
+from urdfkin.compiled.plan import CompiledTree, JointMotion, StepField
 from urdfkin.kinematics import equations
 from urdfkin.model.recursion import Column, Recursion, State
 from urdfkin.model.reference import Reference
@@ -61,12 +61,12 @@ def results(
     for i, (kind, _, place) in enumerate(plan.steps.tolist()):
         R, d = _pose(plan.geometry[i])
         state = recursion.turned(recursion.carried(state, d), R)
-        turns = Motion(kind) is Motion.TURN
+        turns = JointMotion(kind) is JointMotion.TURN
         columns.append(Column(eq.rotate(state.R, _Z), turns, state, i, place, 1.0))
         if turns:
             S = eq.about_z(sines[i], cosines[i], 0.0, 1.0)
             state = recursion.revolute(state, _Z, S, v[i], a[i])
-        elif Motion(kind) is Motion.SLIDE:
+        elif JointMotion(kind) is JointMotion.SLIDE:
             state = recursion.prismatic(state, _Z, x[i], v[i], a[i])
         else:
             raise ValueError("a joint with more than one coordinate")
@@ -105,8 +105,12 @@ def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
         subprocess.CalledProcessError: the compiler rejects the code.
     """
     plan, folder = subject.plan, subject.folder
-    turns = plan.steps[:, Step.KIND] == Motion.TURN
-    tables = {"Q_AT": plan.steps[:, Step.Q], "V_AT": plan.steps[:, Step.V], "TURNS": turns.astype(int)}
+    turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
+    tables = {
+        "Q_AT": plan.steps[:, StepField.Q],
+        "V_AT": plan.steps[:, StepField.V],
+        "TURNS": turns.astype(int),
+    }
     macros = {
         **{"NQ": plan.nq, "NV": plan.nv, "STEPS": len(plan.steps), "RESULTS": subject.numbers(quantity)},
         **{"MOVING": int(quantity == "acceleration"), "PI_2_REST": python_numbers.PI_2_REST},

@@ -30,7 +30,7 @@ from scripts.benchmarking.timing import Calls, Row, Table, Work, agree, measure,
 from urdfkin.compiled.evaluate import is_staged, task_of
 from urdfkin.compiled.machine import kernels
 from urdfkin.compiled.machine.single import single
-from urdfkin.compiled.plan import WIDTH, Head, Op, Program, program_of
+from urdfkin.compiled.plan import WIDTH, Head, KernelProgram, Op, program_of
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -205,7 +205,7 @@ def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         yield _entry("batch", subject, quantity, parts, before)
 
 
-def cut(program: Program, parts: int) -> Program:
+def cut(program: KernelProgram, parts: int) -> KernelProgram:
     """Return the first parts of a program."""
     ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
     words = program.words.copy()
@@ -218,7 +218,7 @@ def cut(program: Program, parts: int) -> Program:
     return replace(program, words=words)
 
 
-def _core(subject: Subject, quantity: str, program: Program, who: str) -> Work:
+def _core(subject: Subject, quantity: str, program: KernelProgram, who: str) -> Work:
     """Return the timed task in which a kernel computes a whole batch."""
     inputs = [STILL_STATE, *subject.inputs(quantity, subject.n)]
     out = np.empty((subject.n, *subject.width(quantity)))

@@ -18,7 +18,7 @@ from urdfkin.validation import chunk as chunk_module
 from urdfkin.validation import comparison, memory
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import chunks, run_chunk
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import subject
 from urdfkin.verify.pinocchio import PinocchioOracle
 
@@ -123,7 +123,7 @@ def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
     monkeypatch.setattr(PinocchioOracle, "__init__", asked)
     monkeypatch.setattr(chunk_module, "_cache", {})
     robot = validate("talos", samples=1).robots[0]
-    assert robot.verdict is Verdict.NOT_VERIFIED
+    assert robot.verdict is ValidationVerdict.NOT_VERIFIED
     assert robot.reason is not None
     assert (
         "not enough memory to check the robot (all processes of a validation may use 50% of the free memory)"

@@ -19,7 +19,7 @@ from urdfkin.validation import answer, engines, worker_processes
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, chunks, run_chunk
 from urdfkin.validation.engines import ExecutorEngine, SerialEngine, Task
-from urdfkin.validation.outcome import Verdict, outcome
+from urdfkin.validation.outcome import ValidationVerdict, outcome
 from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.robot_input import subject
 
@@ -136,7 +136,7 @@ def test_the_chunks_of_a_robot_that_failed_are_not_run(how: Any, monkeypatch: py
     monkeypatch.setattr(answer, "run_chunk", failing)
     robot = validate("planar_two_link", samples=100, **how).robots[0]
     assert ran == [0, 1]
-    assert (robot.verdict, robot.reason, robot.samples) == (Verdict.BAD_INPUT, "no", 28)
+    assert (robot.verdict, robot.reason, robot.samples) == (ValidationVerdict.BAD_INPUT, "no", 28)
 
 
 def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -149,7 +149,7 @@ def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.M
     monkeypatch.setattr(answer, "run_chunk", failing)
     report = validate("planar_two_link", samples=50)
     robot = report.robots[0]
-    assert robot.verdict is Verdict.DISAGREES
+    assert robot.verdict is ValidationVerdict.DISAGREES
     assert str(robot.reason).startswith("20 of ")
     assert "results lie outside their bound; unexpected error" in str(robot.reason)
     assert "MemoryError: no message" in str(robot.reason)
@@ -226,8 +226,8 @@ def test_an_interrupt_keeps_what_had_finished_and_drops_what_waits(
     assert ran[-1] == ("ur5", 1)
     assert report.interrupted
     first, second, third = report.robots
-    assert first.verdict is Verdict.VERIFIED
-    assert (second.samples, second.verdict) == (28, Verdict.NOT_VERIFIED)
+    assert first.verdict is ValidationVerdict.VERIFIED
+    assert (second.samples, second.verdict) == (28, ValidationVerdict.NOT_VERIFIED)
     assert second.reason == "interrupted: 28 of 63 samples were compared"
     assert (third.samples, third.results) == (0, 0)
     assert third.reason == "interrupted: 0 of 63 samples were compared"

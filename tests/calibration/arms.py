@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urdfkin.calibration.parameters import Model, urdf_model
+from urdfkin.calibration.parameters import CalibrationModel, urdf_model
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -46,7 +46,7 @@ class Bench:
     """A robot, the truth about its parameters, and poses of the true one."""
 
     robot: Robot
-    model: Model
+    model: CalibrationModel
     truth: FloatArray
     q: FloatArray
     T: FloatArray

@@ -15,7 +15,7 @@ from tests.reading import present
 from urdfkin.calibration.calibrate import Calibration, calibrate, doubts
 from urdfkin.calibration.fit import stacked
 from urdfkin.calibration.parameters import table_model
-from urdfkin.dh.table import Convention
+from urdfkin.dh.table import DHConvention
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import log_rotation
 from urdfkin.model.tree import FloatArray
@@ -97,8 +97,8 @@ def test_gains_are_found_and_not_written() -> None:
     )
 
 
-@pytest.mark.parametrize("convention", list(Convention))
-def test_a_tables_cells_are_found_with_a_fifth_where_axes_are_parallel(convention: Convention) -> None:
+@pytest.mark.parametrize("convention", list(DHConvention))
+def test_a_tables_cells_are_found_with_a_fifth_where_axes_are_parallel(convention: DHConvention) -> None:
     drawn = table(convention)
     model = table_model(drawn, ("origins",))
     truth = model.way.start + 2e-3 * np.random.default_rng(4).standard_normal(len(model.way.start))

@@ -15,7 +15,7 @@ from tests.calibration.test_way import table
 from tests.reading import present
 from urdfkin.calibration.calibrate import Calibration, ImplausibleError, calibrate
 from urdfkin.calibration.parameters import table_model
-from urdfkin.dh.table import Convention
+from urdfkin.dh.table import DHConvention
 from urdfkin.model.tree import FloatArray
 
 pytestmark = pytest.mark.slow  # a second each, forty of them; those of panda and z1 are long
@@ -142,7 +142,7 @@ def test_sliding_joints_in_millimetres_are_named() -> None:
 
 
 def test_a_tables_data_are_judged_as_a_robots() -> None:
-    drawn = table(Convention.STANDARD)
+    drawn = table(DHConvention.STANDARD)
     model = table_model(drawn, ("origins",))
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
     T = model.way.poses(q, model.way.start + 1e-3)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.calibration.arms import BRANCHED
-from urdfkin.calibration.parameters import Model, table_model, urdf_model
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.calibration.parameters import CalibrationModel, table_model, urdf_model
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.kinematics import equations as eq
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
@@ -54,7 +54,7 @@ def elementary(turns: bool, axis: int, value: Number) -> Pose:
     return IDENTITY, (x, y, z)
 
 
-def quotients(model: Model, tip: Callable[[dict[int, Number]], Pose]) -> FloatArray:
+def quotients(model: CalibrationModel, tip: Callable[[dict[int, Number]], Pose]) -> FloatArray:
     """(6, p) twists of the tip for each parameter, of poses at fifty digits."""
     found = np.zeros((6, len(model.way.parameters)))
     here = tip({})
@@ -68,7 +68,7 @@ def quotients(model: Model, tip: Callable[[dict[int, Number]], Pose]) -> FloatAr
     return found
 
 
-def six(model: Model, where: str, moved: dict[int, Number]) -> Pose:
+def six(model: CalibrationModel, where: str, moved: dict[int, Number]) -> Pose:
     """What the six of a place do."""
     push: Pose = IDENTITY, ZERO
     for k, parameter in enumerate(model.way.parameters):
@@ -113,7 +113,7 @@ def test_a_urdfs_columns_are_the_difference_quotients_of_its_text_at_fifty_digit
     assert difference[3:].max() < bound / model.way.size
 
 
-def table(convention: Convention) -> DHTable:
+def table(convention: DHConvention) -> DHTable:
     rows = (
         DHRow(0.1, 1.2, 0.3, 0.4, JointKind.REVOLUTE, "one"),
         DHRow(0.5, 1e-3, 0.0, -0.2, JointKind.REVOLUTE, "two", beta=2e-3),
@@ -126,9 +126,9 @@ def table(convention: Convention) -> DHTable:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("convention", list(Convention))
+@pytest.mark.parametrize("convention", list(DHConvention))
 def test_a_tables_columns_are_the_difference_quotients_of_its_product_at_fifty_digits(
-    convention: Convention,
+    convention: DHConvention,
 ) -> None:
     dh = table(convention)
     model = table_model(dh, ("base", "tool", "origins", "gains"))
@@ -149,7 +149,7 @@ def test_a_tables_columns_are_the_difference_quotients_of_its_product_at_fifty_d
             a, alpha = at(row.joint, "a", row.a), at(row.joint, "alpha", row.alpha)
             X = joined(elementary(False, 0, a), elementary(True, 0, alpha))
             X = joined(X, elementary(True, 1, at(row.joint, "beta", row.beta)))
-            T = joined(T, joined(S, X) if convention is Convention.STANDARD else joined(X, S))
+            T = joined(T, joined(S, X) if convention is DHConvention.STANDARD else joined(X, S))
         T = joined(T, (matrix(dh.tool[:3, :3]), vector(dh.tool[:3, 3])))
         return joined(T, six(model, "tool", moved))
 

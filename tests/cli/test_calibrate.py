@@ -10,7 +10,7 @@ from tests.cli.running import good, urdfkin
 from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.export import export
 from urdfkin.dh.parse_table import read_table
-from urdfkin.dh.table import Convention
+from urdfkin.dh.table import DHConvention
 from urdfkin.robot.loading import load
 
 
@@ -52,7 +52,7 @@ def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path:
 
 
 def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
-    drawn = table(Convention.STANDARD)
+    drawn = table(DHConvention.STANDARD)
     model = table_model(drawn, ("origins",))
     truth = model.way.start + 1e-3
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 4))

@@ -17,7 +17,7 @@ from tests.cli.running import refused, urdfkin
 from urdfkin.cli.output import Answer, check_writable, write_file
 from urdfkin.dh import read_table
 from urdfkin.errors import SourceError
-from urdfkin.errors.display import Code, Matrix, Strong, Table, TextDocument
+from urdfkin.errors.display import CodeLine, Matrix, Strong, Table, TextDocument
 
 #: A command line -> a word of its table, as text and in LaTeX.
 TABLES = {
@@ -102,7 +102,7 @@ def test_an_entry_for_a_printed_format_replaces_the_document() -> None:
 
 
 def test_a_document_has_matrices_code_and_emphasis_in_every_format() -> None:
-    parts: list[str | Table | Matrix] = [Code("T(i)"), "", Strong("sure")]
+    parts: list[str | Table | Matrix] = [CodeLine("T(i)"), "", Strong("sure")]
     parts.append(Matrix([["1", "-20"], ["300", "4"]]))
     document = TextDocument("", [*parts, Table(("a_b", "[m]"), [("c_d", -0.5)], names=(0,))])
     text, markdown, html, latex = (document.written(form) for form in ("table", "markdown", "html", "latex"))

@@ -9,7 +9,7 @@ import pytest
 import urdfkin
 from tests.cli.running import urdfkin as run
 from tests.reading import present
-from urdfkin.comparison.diff import Change
+from urdfkin.comparison.diff import ModelChange
 from urdfkin.report.diff import markdown_of
 
 OLD = """<robot name="arm">
@@ -65,7 +65,7 @@ def test_two_changes_that_undo_each_other_move_less_together() -> None:
 
 def test_a_change_of_name_alone_is_told_and_moves_nothing() -> None:
     found = urdfkin.diff(OLD, OLD.replace('name="arm"', 'name="leg"'))
-    assert found.changes == (Change("robot", "name", "arm", "leg"),)
+    assert found.changes == (ModelChange("robot", "name", "arm", "leg"),)
     assert (found.effects, found.total) == ((), None)
 
 

@@ -17,7 +17,7 @@ from tests.comparison.test_pairs import FOLLOWING
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic
 from urdfkin.comparison.certificate import certificate, recheck
-from urdfkin.comparison.result import Question, Verdict
+from urdfkin.comparison.result import SameQuestion, Verdict
 from urdfkin.robot import Robot
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -53,7 +53,7 @@ def finger(multiplier: float) -> str:
 def headline(a: str | Robot, b: str | Robot, **asked: float) -> str:
     from urdfkin.report.same import headline as of  # noqa: PLC0415
 
-    return of(urdfkin.same(a, b, **asked), Question(**asked))  # type: ignore[arg-type]
+    return of(urdfkin.same(a, b, **asked), SameQuestion(**asked))  # type: ignore[arg-type]
 
 
 def test_a_tool_that_moved_is_equivalent_up_to_tools_and_is_not_within_less() -> None:

@@ -18,7 +18,7 @@ from tests.comparison.searching import far, searched
 from tests.reading import present
 from tests.urdfs import joint, limit, loaded, mimic
 from tests.urdfs import robot as urdf
-from urdfkin.comparison.bounds import Boxes, Search, curvature, moved_together, tightened
+from urdfkin.comparison.bounds import Boxes, DistanceSearch, curvature, moved_together, tightened
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
@@ -105,24 +105,26 @@ BOXES = [
 ]  # fmt: skip
 
 
-def searched_boxes(name: str, what: str, link: str) -> tuple[Search, FramePair]:
+def searched_boxes(name: str, what: str, link: str) -> tuple[DistanceSearch, FramePair]:
     return laid(robot(name), present(changed(name, what)), link)
 
 
-def laid(a: Robot, b: Robot, link: str, gauge: Gauge | None = None) -> tuple[Search, FramePair]:
+def laid(a: Robot, b: Robot, link: str, gauge: Gauge | None = None) -> tuple[DistanceSearch, FramePair]:
     judge = Comparator((a, b), {}, bounds=True)
     found = align(*judge.mechanisms, {}, gauge)
     frame = next(one for one in found.frames if a.tree.links[one.a] == link)
     return judge.search(found, variables_of(found, judge.tolerance)), frame
 
 
-def bounds_of(search: Search, frame: FramePair) -> tuple[Sequence[str], FloatArray]:
+def bounds_of(search: DistanceSearch, frame: FramePair) -> tuple[Sequence[str], FloatArray]:
     """Variables, and bounds on second derivatives by them."""
     steps, some = moved_together(search.found, search.variables, frame)
     return curvature(steps, [one for one in some if one is not None], search.variables, frame)
 
 
-def hold_against_differences(search: Search, frame: FramePair, names: Sequence[str], M: FloatArray) -> None:
+def hold_against_differences(
+    search: DistanceSearch, frame: FramePair, names: Sequence[str], M: FloatArray
+) -> None:
     """Bounds M on second derivatives against difference quotients of the first ones."""
     boxes = Boxes(search, frame, names)
     c, step = search.random(200)[:, boxes.at], 1e-3

@@ -18,7 +18,7 @@ from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.motion import acceleration, jacobian, velocity
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.table import DHConvention, DHTable
 from urdfkin.dh.units import Angles, Lengths, Units, fraction_text, pi_fraction, read_number, units_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import rotation_from_rpy
@@ -113,7 +113,7 @@ def exact_placement(table: DHTable, values: list[float]) -> mpmath.matrix:
         S = mp_turn(2, theta) * mp_shift(2, d)
         a, alpha, beta = map(mpmath.mpf, (row.a, row.alpha, row.beta))
         X = mp_shift(0, a) * mp_turn(0, alpha) * mp_turn(1, beta)
-        T = T * (S * X if table.convention is Convention.STANDARD else X * S)
+        T = T * (S * X if table.convention is DHConvention.STANDARD else X * S)
     return T * mpmath.matrix(table.tool.tolist())
 
 

@@ -15,7 +15,7 @@ from tests.cli.test_dh import run
 from tests.dh.arms import arm
 from tests.dh.test_compare import disguised, elbow
 from tests.random_chains import configurations, rotation, shift, trees
-from urdfkin.dh import Convention, dh_table, export, read_table, table_from_rows, units_of
+from urdfkin.dh import DHConvention, dh_table, export, read_table, table_from_rows, units_of
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.parse_table import published, read_mapping, reference_path, references
 from urdfkin.errors import InputError
@@ -155,7 +155,7 @@ def test_a_robot_with_a_published_table_is_told_of_it() -> None:
     assert "hint: published standard table of this robot: --like ur5" in run("ur5").text
     assert "published" not in run("ur5", "--like", "ur5").text
     for name in references():
-        assert Convention(read_mapping(reference_path(name))["convention"])
+        assert DHConvention(read_mapping(reference_path(name))["convention"])
 
 
 def test_what_like_decides_is_not_decided_twice() -> None:

@@ -14,7 +14,7 @@ import pytest
 from tests.cli.test_dh import run
 from tests.dh.arms import with_cell
 from urdfkin.dh import DHTable, read_table, table_from_rows, units_of
-from urdfkin.dh.compare import Comparison, compare, document
+from urdfkin.dh.compare import TableComparison, compare, document
 from urdfkin.dh.convert import to_tree
 from urdfkin.dh.parse_table import reference_path, references
 from urdfkin.model.chain import FrameChain, chain
@@ -40,7 +40,7 @@ def with_wrong_signs(table: DHTable) -> Iterator[tuple[int, str, DHTable]]:
                 yield i, cell, with_cell(table, i, cell, -value)
 
 
-def named(found: Comparison) -> list[tuple[int, str, float]]:
+def named(found: TableComparison) -> list[tuple[int, str, float]]:
     cells = [one.cell for one in found.mistakes]
     return [(one.row, one.cell, one.urdf) for one in cells if one is not None]
 

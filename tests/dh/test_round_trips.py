@@ -15,7 +15,7 @@ from tests.random_chains import configurations, trees
 from urdfkin.dh import table_from_rows
 from urdfkin.dh.convert import to_convention, to_tree
 from urdfkin.dh.make import dh_table
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
@@ -92,7 +92,7 @@ def test_the_stanford_arm_survives_the_way_to_a_tree_and_back_cell_by_cell() -> 
 
 def test_a_leader_off_the_path_stays_a_coordinate_in_the_tree() -> None:
     row = DHRow(0.3, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "follower", mimic=Mimic("far", 2.0, 0.1))
-    table = DHTable(Convention.STANDARD, (row,))
+    table = DHTable(DHConvention.STANDARD, (row,))
     robot = to_tree(table)
     assert table.joint_names == ("far",)
     assert robot.nq == 1
@@ -117,8 +117,8 @@ def test_an_inconsistent_row_is_refused(change: dict[str, object], message: str)
 def test_two_rows_of_one_joint_and_a_bent_base_are_refused() -> None:
     row = DHRow(0.0, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "j")
     with pytest.raises(InputError, match="two rows name the same joint: found 'j'"):
-        DHTable(Convention.STANDARD, (row, row))
+        DHTable(DHConvention.STANDARD, (row, row))
     with pytest.raises(InputError, match="rotation and a translation"):
-        DHTable(Convention.STANDARD, (row,), base=np.diag([1.0, 1.0, 2.0, 1.0]))
+        DHTable(DHConvention.STANDARD, (row,), base=np.diag([1.0, 1.0, 2.0, 1.0]))
     with pytest.raises(InputError, match=r"\(4, 4\)"):
-        DHTable(Convention.STANDARD, (row,), tool=np.eye(3))
+        DHTable(DHConvention.STANDARD, (row,), tool=np.eye(3))

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from urdfkin.export import LANGUAGES, write
-from urdfkin.export.code import Code, code_of, exported
+from urdfkin.export.code import FrameCode, code_of, exported
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 
@@ -28,13 +28,13 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
 def code(
     robot: Robot, frame: str | None = None, quantities: tuple[str, ...] = ALL, reference: Reference = _ALIGNED
-) -> Code:
+) -> FrameCode:
     """What is written about a frame."""
     frame = frame or robot.tip_frame
     return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=None, verify=None)
 
 
-def file(written: Code, to: str, folder: Path) -> Path:
+def file(written: FrameCode, to: str, folder: Path) -> Path:
     """Its text in a language, as a file."""
     path = folder / f"{written.name}{LANGUAGES[to][1]}"
     path.write_text(write(written, to), encoding="utf-8")

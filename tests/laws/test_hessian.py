@@ -57,7 +57,7 @@ def truths(robot: Robot, q: FloatArray, link: int, reference: Reference) -> tupl
     """(6, nv, nv) of the equations, and by difference quotients of the Jacobian, both at fifty digits."""
     joints, still = read_exact(robot.urdf, robot.tree, robot.tree.path(link)), [0.0] * robot.nv
 
-    def at(x: list[Any]) -> recursion.Motion:
+    def at(x: list[Any]) -> recursion.ExactMotion:
         return recursion.move(robot.tree, joints, x, still, still)
 
     found = HESSIAN.truth(at(list(q)), link, reference)

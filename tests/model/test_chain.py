@@ -16,7 +16,7 @@ from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.model.chain import chain
-from urdfkin.model.path import Motion, Path, elementary
+from urdfkin.model.path import ElementaryMotion, Path, elementary
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, build_tree, pose
 from urdfkin.verify.chain_checks import check_chain
 from urdfkin.verify.oracle import QueryBatch
@@ -182,7 +182,7 @@ def test_an_origin_or_a_direction_off_by_itself_is_a_disagreement(
 
 
 A = pose(exp_rotation([0.3, -0.4, 0.5]), [0.1, 0.2, 0.3])
-MOTIONS = tuple(Motion(axis, turns) for turns in (True, False) for axis in range(3))
+MOTIONS = tuple(ElementaryMotion(axis, turns) for turns in (True, False) for axis in range(3))
 PATH = Path((A, *(step for motion in MOTIONS for step in (motion, A))))
 AMOUNTS = np.random.default_rng(0).uniform(-1.0, 1.0, (4, len(MOTIONS)))
 

@@ -8,7 +8,7 @@ from typing import cast
 
 from tests.urdfs import joint, limit, robot
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.document import Check, Document
+from urdfkin.validation.document import Document, ReportedCheck
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, percentile
 
 #: What must never become an element, an attribute or a line of code.
@@ -58,7 +58,7 @@ def failing() -> Document:
     return document
 
 
-def beyond_numbers(check: Check, place: int, frame: str) -> None:
+def beyond_numbers(check: ReportedCheck, place: int, frame: str) -> None:
     """Three results of a frame are no numbers, in all entries that tell."""
     often = max(range(len(check["histogram"])), key=check["histogram"].__getitem__)
     check["histogram"][often] -= 3

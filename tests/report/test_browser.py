@@ -12,7 +12,7 @@ from tests.report.browser import Browser, opened, require_chromium
 from tests.report.documents import arms, failing, hostile
 from urdfkin.report import html
 from urdfkin.report.html import as_html
-from urdfkin.validation.document import Document, Robot
+from urdfkin.validation.document import Document, ReportedRobot
 
 pytestmark = [pytest.mark.long, pytest.mark.browser]
 
@@ -253,7 +253,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(html, "MOST", 100_000)
         right = html._robot
 
-        def once(robot: Robot, index: int, whole: Document) -> dict[str, Any]:
+        def once(robot: ReportedRobot, index: int, whole: Document) -> dict[str, Any]:
             kind = robot["source"] == dangerous["source"]
             if kind not in made:
                 made[kind] = right(robot, index, whole)

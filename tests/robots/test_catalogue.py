@@ -20,7 +20,7 @@ from urdfkin.model.tree import JointKind
 from urdfkin.robot import Robot
 from urdfkin.system.resources import example_robots_dir
 from urdfkin.urdf.catalogue import catalogue, examples
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Pinocchio 4.1 builds no model with mimic=True of these: it does not find their leaders.
@@ -79,7 +79,7 @@ def test_its_limbs_name_frames_that_exist_and_move(robot: Robot) -> None:
 
 def test_every_quantity_of_every_frame_agrees(robot: Robot) -> None:
     report = urdfkin.validate(robot, samples=1).robots[0]
-    assert (report.verdict, report.failed) == (Verdict.VERIFIED, 0)
+    assert (report.verdict, report.failed) == (ValidationVerdict.VERIFIED, 0)
     frames, moving = len(robot.all_frames), len(robot.joint_names)
     results = {quantity: sum(tally.results for tally in report.of(quantity)) for quantity in QUANTITIES}
     assert results["placement"] == 4 * frames
@@ -90,7 +90,7 @@ def test_every_quantity_of_every_frame_agrees(robot: Robot) -> None:
 @pytest.mark.slow
 def test_every_quantity_agrees_on_many_samples(robot: Robot) -> None:
     report = urdfkin.validate(robot, samples=50, seed=1).robots[0]
-    assert (report.verdict, report.failed) == (Verdict.VERIFIED, 0)
+    assert (report.verdict, report.failed) == (ValidationVerdict.VERIFIED, 0)
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from tests.urdfs import loaded
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.verify.quantities import QUANTITIES
 
@@ -29,7 +29,7 @@ def rates(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, Floa
 
 def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
     """Nothing failed, and nothing was left out: results are counted from the robot, not from the report."""
-    assert (report.verdict, report.failed, report.reason) == (Verdict.VERIFIED, 0, None)
+    assert (report.verdict, report.failed, report.reason) == (ValidationVerdict.VERIFIED, 0, None)
     frames = len(robot.tree.links) + len(robot.tree.joints)
     moving = [joint for joint in robot.tree.joints if joint.kind.nv]
     counts = {quantity: sum(tally.results for tally in report.of(quantity)) for quantity in QUANTITIES}

@@ -15,11 +15,11 @@ from urdfkin.comparison.certificate import SAME, certificate
 from urdfkin.errors import InputError
 from urdfkin.report.compare import COMPARISON, compare
 from urdfkin.report.history import HISTORY, history
-from urdfkin.system.documents import Header, Layout, as_data, plain
+from urdfkin.system.documents import DocumentKind, Header, as_data, plain
 from urdfkin.validation.document import VALIDATION
 from urdfkin.verify.certificate import CERTIFICATE
 
-LAYOUTS: list[Layout[Any]] = [VALIDATION, COMPARISON, HISTORY, SAME, CERTIFICATE]
+LAYOUTS: list[DocumentKind[Any]] = [VALIDATION, COMPARISON, HISTORY, SAME, CERTIFICATE]
 
 
 @cache
@@ -43,18 +43,18 @@ def _made(name: str) -> str:
     return json.dumps(arms())
 
 
-def made(layout: Layout[Any]) -> Any:
+def made(layout: DocumentKind[Any]) -> Any:
     """A document of a layout; a fresh copy each time."""
     return json.loads(_made(layout.name))
 
 
-def ids(layout: Layout[Any]) -> str:
+def ids(layout: DocumentKind[Any]) -> str:
     return layout.name
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
 def test_each_document_conforms_to_its_generated_schema_and_is_read_as_it_was_written(
-    layout: Layout[Any], tmp_path: Path
+    layout: DocumentKind[Any], tmp_path: Path
 ) -> None:
     schema = json.loads(layout.schema_text())
     Draft202012Validator.check_schema(schema)
@@ -64,7 +64,7 @@ def test_each_document_conforms_to_its_generated_schema_and_is_read_as_it_was_wr
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
-def test_each_document_begins_with_the_same_header(layout: Layout[Any]) -> None:
+def test_each_document_begins_with_the_same_header(layout: DocumentKind[Any]) -> None:
     header = ["schema", "versions", "sha256", "verdict", "command"]
     assert list(Header.__annotations__) == header
     assert list(made(layout))[:5] == list(layout.schema()["properties"])[:5] == header
@@ -73,7 +73,7 @@ def test_each_document_begins_with_the_same_header(layout: Layout[Any]) -> None:
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
-def test_every_entry_of_a_schema_is_described(layout: Layout[Any]) -> None:
+def test_every_entry_of_a_schema_is_described(layout: DocumentKind[Any]) -> None:
     schema = layout.schema()
     for part in (schema, *schema["$defs"].values()):
         assert part["description"]
@@ -93,7 +93,7 @@ def test_every_entry_of_a_schema_is_described(layout: Layout[Any]) -> None:
     ],
 )
 def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
-    layout: Layout[Any], entry: str, value: object, said: str
+    layout: DocumentKind[Any], entry: str, value: object, said: str
 ) -> None:
     with pytest.raises(InputError) as error:
         layout.checked(made(layout) | {entry: value}, "a.json")
@@ -105,7 +105,7 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
-def test_another_layout_and_an_unknown_version_are_two_errors(layout: Layout[Any]) -> None:
+def test_another_layout_and_an_unknown_version_are_two_errors(layout: DocumentKind[Any]) -> None:
     family, _, version = layout.name.rpartition("/")
     with pytest.raises(InputError, match=f"unknown version of the layout {family}.*reads version {version}:"):
         layout.checked({"schema": f"{family}/99"}, "a.json")
@@ -116,7 +116,7 @@ def test_another_layout_and_an_unknown_version_are_two_errors(layout: Layout[Any
 
 
 @pytest.mark.parametrize("layout", [COMPARISON, HISTORY, SAME, CERTIFICATE], ids=ids)
-def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: Layout[Any]) -> None:
+def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: DocumentKind[Any]) -> None:
     with pytest.raises(InputError, match=r"found \$: unknown entry 'more'"):
         layout.checked(made(layout) | {"more": 1}, "a.json")
 
@@ -133,7 +133,7 @@ def test_an_unknown_entry_is_refused_however_deep_it_is() -> None:
     "text", ["NaN", "-Infinity", "1e999", "[" * 100_000, "1" + "0" * 5000, "{", "", "\udc80", '"\x00']
 )
 @pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
-def test_no_file_that_is_no_json_is_read(layout: Layout[Any], text: str, tmp_path: Path) -> None:
+def test_no_file_that_is_no_json_is_read(layout: DocumentKind[Any], text: str, tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
     with pytest.raises(InputError, match="not a JSON file"):

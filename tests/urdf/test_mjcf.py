@@ -458,7 +458,7 @@ def wrong_multiplier(right: Callable[..., Any]) -> Callable[..., Any]:
 
 @pytest.mark.parametrize(
     ("where", "name", "slip"),
-    [(mjcf._Reader, "_rule", wrong_offset), (mjcf, "resolve", wrong_multiplier)],
+    [(mjcf._MjcfReader, "_rule", wrong_offset), (mjcf, "resolve", wrong_multiplier)],
     ids=["an offset", "the multiplier of a mimic of a mimic"],
 )
 def test_a_slip_in_a_mimic_rule_is_found_by_mujocos_own_equality(

@@ -25,7 +25,7 @@ from tests.cli.running import urdfkin as command
 from tests.reading import present
 from tests.urdfs import loaded
 from urdfkin.comparison.certificate import certificate, recheck
-from urdfkin.comparison.result import Question
+from urdfkin.comparison.result import SameQuestion
 from urdfkin.errors import InputError, OracleError, SourceError
 from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
 from urdfkin.kinematics.roundings import SINGLE
@@ -970,7 +970,7 @@ def test_openusds_parser_notices_a_slip_of_our_reader(
 ) -> None:
     path = write(stage(LINKS + JOINTS, unit=0.5))
     assert slipped(monkeypatch, path).nq == 2
-    side, motion = usd._Reader._side, usd._Reader._motion
+    side, motion = usd._StageReader._side, usd._StageReader._motion
 
     def wrong_side(self: Any, prim: Any, i: int, target: str | None) -> Any:
         found = present(side(self, prim, 1 - i if slip == "swapped" else i, target))
@@ -983,8 +983,8 @@ def test_openusds_parser_notices_a_slip_of_our_reader(
         factor = 180.0 / math.pi if slip == "degrees" else 1.0
         return kind, axis, (lower * factor, upper * factor), "rotX" if slip == "axis" else free
 
-    monkeypatch.setattr(usd._Reader, "_side", wrong_side)
-    monkeypatch.setattr(usd._Reader, "_motion", wrong_motion)
+    monkeypatch.setattr(usd._StageReader, "_side", wrong_side)
+    monkeypatch.setattr(usd._StageReader, "_motion", wrong_motion)
     with pytest.raises(
         OracleError, match="OpenUSD's parser of UsdPhysics and urdfkin disagree about this joint"
     ):
@@ -1093,10 +1093,10 @@ def test_rounding_to_single_precision_explains_the_difference_from_the_urdf(writ
     assert found.up_to_single
     assert (found.unexplained, found.within_single) == ((), False)
     assert 0.0 < found.written[0] <= found.single[0] < 5e-6
-    assert found.holds(Question())
-    assert found.holds(Question(strict=True)) is not bool(found.remarks)
-    assert found.holds(Question(within=5e-6))
-    assert not found.holds(Question(within=0.0))
+    assert found.holds(SameQuestion())
+    assert found.holds(SameQuestion(strict=True)) is not bool(found.remarks)
+    assert found.holds(SameQuestion(within=5e-6))
+    assert not found.holds(SameQuestion(within=0.0))
 
 
 def test_all_outputs_name_the_verdict_up_to_single_precision_alike(write: Write, tmp_path: Path) -> None:
@@ -1184,7 +1184,7 @@ def test_an_error_below_the_rounding_of_a_long_slide_is_found_and_its_joint_name
     assert 4e-5 < found.written[0] < found.single[0]  # the sum of all roundings does not exclude the error
     assert found.within_single
     assert not found.up_to_single
-    assert not found.holds(Question())
+    assert not found.holds(SameQuestion())
     [one] = map(str, found.unexplained)
     assert one == "joint elbow: origin 50.01 µm off, rounding explains at most 14.9 nm"
     done = command("same", "-", str(stage_file), "--boxes", "0", stdin=LONG_SLIDE)
@@ -1633,7 +1633,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
     """UsdGeom composes each transform twice, from numbers in double and from the same in single precision."""
     pxr, rng = usd.library(), np.random.default_rng(3)
     made, gf = pxr.Usd.Stage.CreateInMemory(), pxr.Gf
-    reader = usd._Reader(pxr, made, "", frozenset())
+    reader = usd._StageReader(pxr, made, "", frozenset())
     reader._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
 
     def placed(op: str, value: Any, precision: str, k: int) -> Any:

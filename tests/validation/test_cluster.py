@@ -38,7 +38,7 @@ from urdfkin.validation import cluster
 from urdfkin.validation.campaign import stored, validate
 from urdfkin.validation.cluster import Cluster, ClusterError, connected
 from urdfkin.validation.collector import CampaignProgress
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput, subject
 
@@ -221,7 +221,7 @@ def test_a_robot_that_kills_its_process_is_blamed_and_none_of_its_neighbours(
         report = validate(robots, samples=0, executor=two)
     finally:
         two._client.run(_deadly, str(deaths), "urdfkin.validation.worker_processes")
-    assert [i for i, robot in enumerate(report.robots) if robot.verdict != Verdict.VERIFIED] == [25]
+    assert [i for i, robot in enumerate(report.robots) if robot.verdict != ValidationVerdict.VERIFIED] == [25]
     words = "crashed twice; the second time it computed nothing else"
     assert report.robots[25].reason == DIED.format(words)
     assert deaths.read_text() == "97"

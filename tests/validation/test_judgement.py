@@ -25,7 +25,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import judged_on, nearer, nearer_counts
 from urdfkin.system.documents import plain
 from urdfkin.validation import accuracy
-from urdfkin.validation.accuracy import Errors, Judgement, Line, exact_quaternion, judge
+from urdfkin.validation.accuracy import AccuracyLine, Errors, Judgement, exact_quaternion, judge
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.exact import recursion as exact_recursion
 from urdfkin.verify.exact.numbers import exact, precision, read_exact
@@ -92,7 +92,7 @@ def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() ->
     robot = urdfkin.load("polar")
     joints, link = read_exact(robot.urdf, robot.tree), robot.tree.link_index("slider")
 
-    def at(t: float) -> exact_recursion.Motion:
+    def at(t: float) -> exact_recursion.ExactMotion:
         q = [exact(x) + t * exact(rate) for x, rate in zip(moving.q, moving.v, strict=True)]
         return exact_recursion.move(robot.tree, joints, q, moving.v, moving.v)
 
@@ -153,7 +153,7 @@ def test_where_nothing_moves_or_nothing_is_drawn_there_are_the_same_lines(name: 
 def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
     ours: tuple[float, float], theirs: tuple[float, float], worse: bool
 ) -> None:
-    line = Line("velocity", "local", 1, Errors(*ours), Errors(*theirs))
+    line = AccuracyLine("velocity", "local", 1, Errors(*ours), Errors(*theirs))
     assert line.ours_is_worse == worse
 
 
@@ -242,7 +242,7 @@ def test_the_analytical_jacobian_at_fifty_digits_is_the_difference_quotient_of_i
     joints, link = read_exact(robot.urdf, robot.tree), robot.tree.frame_link("panda_hand")
     q, zeros, step = robot.sample(1, 5)[0], [0] * robot.nv, 2.0**-60
 
-    def at(column: int, off: float) -> exact_recursion.Motion:
+    def at(column: int, off: float) -> exact_recursion.ExactMotion:
         numbers = [exact(x) + (off if i == column else 0) for i, x in enumerate(q)]
         return exact_recursion.move(robot.tree, joints, numbers, zeros, zeros)
 
@@ -281,7 +281,7 @@ def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_o
 ) -> None:
     robot = urdfkin.load("ur5")
 
-    def lines() -> dict[str | None, Line]:
+    def lines() -> dict[str | None, AccuracyLine]:
         return {x.reference: x for x in judge(robot, samples=2).lines if x.quantity == quantity}
 
     quantity = "analytical jacobian"
@@ -299,8 +299,8 @@ def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_o
 
 
 def test_errors_that_are_the_same_double_are_equal_as_the_page_says() -> None:
-    def line(ours: float, theirs: float) -> Line:
-        return Line("placement", "", 9, Errors(1.0, ours), Errors(1.0, theirs))
+    def line(ours: float, theirs: float) -> AccuracyLine:
+        return AccuracyLine("placement", "", 9, Errors(1.0, ours), Errors(1.0, theirs))
 
     judged = Judgement("arm", 1, 0, (line(0.1, 0.2), line(0.2, 0.2), line(0.3, 0.2), line(0.1, 0.1)))
     lines = plain(judged)["lines"]

@@ -20,7 +20,7 @@ from urdfkin.dh import dh_table
 from urdfkin.robot import Robot
 from urdfkin.validation import robot_summary as chains_module
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_summary import MOST, chains_of
 from urdfkin.validation.timings import Clock, total
@@ -81,7 +81,7 @@ def test_a_wrong_table_fails_its_robot(shift: Callable[..., None]) -> None:
     shift()
     robot = validate("ur5", samples=0).robots[0]
     assert robot.failed == 0
-    assert robot.verdict is Verdict.DISAGREES
+    assert robot.verdict is ValidationVerdict.DISAGREES
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])

@@ -26,7 +26,7 @@ from urdfkin.validation.campaign import StoreWarning, shares, stored, validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, chunks, run_chunk
 from urdfkin.validation.collector import CampaignProgress, Progress, ResultCollector
 from urdfkin.validation.engines import Task
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import subject
 from urdfkin.validation.store import Store
 
@@ -149,7 +149,7 @@ def test_what_failed_is_tried_again_when_asked_for_and_may_be_another_text(tmp_p
     good.write_text('<robot name="a"><link name="l"/></robot>')
     bad.write_text("<robot/>")
     robots, store = [str(good), str(bad)], tmp_path / "store"
-    assert validate(robots, samples=0, store=store).robots[1].verdict == Verdict.BAD_INPUT
+    assert validate(robots, samples=0, store=store).robots[1].verdict == ValidationVerdict.BAD_INPUT
     bad.write_text('<robot name="mended"><link name="l"/></robot>')
     with pytest.raises(InputError, match="another campaign"):
         validate(robots, samples=0, store=store)
@@ -166,7 +166,7 @@ def test_what_the_machinery_lost_is_not_kept_as_the_robots_failure(
     monkeypatch: pytest.MonkeyPatch, undisturbed: str, tmp_path: Path
 ) -> None:
     broken = validate(ROBOTS, samples=SAMPLES, store=tmp_path, executor=Refusing(1, when_asked=True))
-    assert broken.robots[0].verdict == Verdict.NOT_VERIFIED
+    assert broken.robots[0].verdict == ValidationVerdict.NOT_VERIFIED
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path)) == undisturbed
 
 
@@ -183,7 +183,7 @@ def test_an_answer_is_read_back_to_the_last_bit() -> None:
     odd: Any = {"worst": float("inf"), "by_frame": (0.1 + 0.2, 5e-324, float("inf"))}
     tallies = {key: replace(tally, **odd) for key, tally in found.tallies.items()}
     other = replace(found, tallies=tallies, portrait=None)
-    for each in (found, other, Failure(Verdict.BAD_INPUT, "no \ud800")):
+    for each in (found, other, Failure(ValidationVerdict.BAD_INPUT, "no \ud800")):
         again = read("k", written("k", each))
         assert json.dumps(_plain(again)) == json.dumps(_plain(each))
 
@@ -216,7 +216,7 @@ def test_a_chunk_of_another_layout_is_damaged_though_its_checksum_is_right(forge
 
 
 def test_no_byte_of_a_chunk_can_be_changed_or_cut_off_unnoticed() -> None:
-    whole = written("k", Failure(Verdict.BAD_INPUT, "why"))
+    whole = written("k", Failure(ValidationVerdict.BAD_INPUT, "why"))
     for place in range(len(whole)):
         for bit in (1, 128):
             damaged = bytearray(whole)
@@ -242,7 +242,7 @@ def test_a_damaged_store_is_reported_and_made_whole(undisturbed: str, tmp_path: 
     with pytest.warns(StoreWarning, match="is damaged and is computed again: ") as told:
         partly = stored(tmp_path)
     assert len(told) == 4
-    assert partly.interrupted or partly.robots[1].verdict == Verdict.NOT_VERIFIED
+    assert partly.interrupted or partly.robots[1].verdict == ValidationVerdict.NOT_VERIFIED
     with pytest.warns(StoreWarning, match="is damaged and is computed again: "):
         assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path)) == undisturbed
     assert numbers(stored(tmp_path)) == undisturbed
@@ -318,7 +318,10 @@ def test_what_is_no_part_is_refused(word: str, tmp_path: Path) -> None:
 def test_parts_from_several_machines_merge_to_the_report_of_one_run(undisturbed: str, tmp_path: Path) -> None:
     for i in (1, 2, 3):
         part = validate(ROBOTS, samples=SAMPLES, store=tmp_path / str(i), shard=f"{i}/3")
-        assert {robot.verdict for robot in part.robots} <= {Verdict.VERIFIED, Verdict.BAD_INPUT}
+        assert {robot.verdict for robot in part.robots} <= {
+            ValidationVerdict.VERIFIED,
+            ValidationVerdict.BAD_INPUT,
+        }
     whole = tmp_path / "whole"
     early = run("report merge", str(whole), str(tmp_path / "1"), str(tmp_path / "3"))
     assert "chunks missing" in early.text
@@ -372,7 +375,7 @@ def _peak(chunks_: int) -> int:
     (report,) = gathering.reports()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert report.verdict == Verdict.VERIFIED
+    assert report.verdict == ValidationVerdict.VERIFIED
     return peak
 
 

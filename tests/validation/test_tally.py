@@ -8,7 +8,7 @@ import pytest
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
 from urdfkin.verify.bounds import Bound
-from urdfkin.verify.certificate import Comparison
+from urdfkin.verify.certificate import BatchComparison
 
 FRAMES = ("a", "b", "c")
 
@@ -31,7 +31,7 @@ def test_a_result_outside_its_bound_is_counted_however_little_and_disagrees(
     found = made(np.array([[1.0, units, 2.0]]))
     assert (found.results, found.failed) == (3, failed)
     assert (found.share > 1.0) == bool(failed)
-    assert Comparison(3, 1.0, found.share, ()).agrees == (not failed)
+    assert BatchComparison(3, 1.0, found.share, ()).agrees == (not failed)
     assert found.case is not None
     assert found.case.frame == "b"
 

@@ -16,7 +16,7 @@ from urdfkin.report.reading import checked, contradictions
 from urdfkin.validation import comparison
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
-from urdfkin.validation.error_stats import Pair, ThreeSides, plus, tally, three_sides
+from urdfkin.validation.error_stats import OraclePair, ThreeSides, plus, tally, three_sides
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import PinocchioOracle
@@ -88,8 +88,8 @@ def test_two_answers_agree_up_to_their_bound_and_no_further(
 def test_of_several_blocks_the_worst_disagreement_is_kept() -> None:
     small, large = asked(0, 2, 6), asked(0, -4, 14)
     for total in (small + large, large + small):
-        assert total.urdfkin == Pair(0, large.urdfkin.worst, large.urdfkin.share_of_bound)
-        assert total.pinocchio == Pair(0, large.pinocchio.worst, large.pinocchio.share_of_bound)
+        assert total.urdfkin == OraclePair(0, large.urdfkin.worst, large.urdfkin.share_of_bound)
+        assert total.pinocchio == OraclePair(0, large.pinocchio.worst, large.pinocchio.share_of_bound)
     assert small.urdfkin.worst < large.urdfkin.worst
     assert small.pinocchio.share_of_bound < large.pinocchio.share_of_bound
 

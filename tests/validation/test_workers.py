@@ -21,8 +21,8 @@ from urdfkin.validation.answer import Answer
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk, Cut
 from urdfkin.validation.collector import CampaignProgress
-from urdfkin.validation.engines import Row, Task, WorkQueue
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.engines import RobotTasks, Task, WorkQueue
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import RobotInput
 
 ROBOTS = ["double_pendulum", "ur5", "iris_simple"]
@@ -53,7 +53,7 @@ def test_processes_change_no_number(how: dict[str, Any]) -> None:
 def test_a_death_is_that_robots_result_and_the_others_go_on(how: dict[str, Any], deaths: Path) -> None:
     deaths.write_text("99")
     report = validate(ROBOTS, samples=60, **how)
-    verdicts = [Verdict.VERIFIED, Verdict.NOT_VERIFIED, Verdict.VERIFIED]
+    verdicts = [ValidationVerdict.VERIFIED, ValidationVerdict.NOT_VERIFIED, ValidationVerdict.VERIFIED]
     assert [robot.verdict for robot in report.robots] == verdicts
     twice = "crashed twice; the second process computed nothing else"
     assert report.robots[1].reason == DIED.format("crashed" if "isolate" in how else twice)
@@ -74,7 +74,7 @@ def test_a_robot_over_which_one_worker_died_is_tried_again_and_verified_in_full(
 def test_what_cannot_be_read_is_reported_as_without_processes() -> None:
     robots = ["<robot/>", "no such robot"]
     plain = validate(robots, samples=60)
-    assert {robot.verdict for robot in plain.robots} == {Verdict.BAD_INPUT}
+    assert {robot.verdict for robot in plain.robots} == {ValidationVerdict.BAD_INPUT}
     assert plain.exit_code == 2
     for how in HOW:
         assert numbers(validate(robots, samples=60, **how)) == numbers(plain)
@@ -111,7 +111,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
     monkeypatch.setattr(worker_processes, "_interpreter", none)
     for how in HOW:
         report = validate(["ur5", "planar_two_link"], samples=60, **how)
-        assert [robot.verdict for robot in report.robots] == [Verdict.NOT_VERIFIED] * 2
+        assert [robot.verdict for robot in report.robots] == [ValidationVerdict.NOT_VERIFIED] * 2
         reason = "no process could be started: OSError: [Errno 24] Too many open files"
         assert {robot.reason for robot in report.robots} == {reason}
         assert not report.passed
@@ -197,7 +197,7 @@ def work(robots: int) -> Iterator[Iterator[Task]]:
     return (iter([Task(i, CUT.chunk(NOBODY, 0, k)) for k in range(4)]) for i in range(robots))
 
 
-def step(deal: WorkQueue, row: Row | None) -> tuple[tuple[int, int] | None, Row | None]:
+def step(deal: WorkQueue, row: RobotTasks | None) -> tuple[tuple[int, int] | None, RobotTasks | None]:
     """What somebody with a row, or without, is given; and the row that they have then."""
     if row is not None and (task := deal.next(row)) is not None:
         return (task.robot, task.chunk.index), row
@@ -208,7 +208,7 @@ def step(deal: WorkQueue, row: Row | None) -> tuple[tuple[int, int] | None, Row 
 
 
 def test_two_have_a_robot_each_and_share_the_last_and_what_is_put_back_is_dealt_again() -> None:
-    deal, rows = WorkQueue(work(3)), list[Row | None]([None, None])
+    deal, rows = WorkQueue(work(3)), list[RobotTasks | None]([None, None])
     seen = [list[tuple[int, int]](), list[tuple[int, int]]()]
     for turn in (0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1):
         given, rows[turn] = step(deal, rows[turn])
@@ -234,7 +234,7 @@ def test_two_have_a_robot_each_and_share_the_last_and_what_is_put_back_is_dealt_
 
 def test_help_goes_to_the_robot_of_which_most_is_left_and_nobody_helps_where_each_is_alone() -> None:
     deal = WorkQueue(work(2))
-    (_, first), (_, second) = deal.first() or ((), Row(())), deal.first() or ((), Row(()))
+    (_, first), (_, second) = deal.first() or ((), RobotTasks(())), deal.first() or ((), RobotTasks(()))
     for _ in range(2):
         deal.next(first)
     task, row = deal.first() or (None, None)

@@ -17,7 +17,7 @@ import urdfkin
 from tests.laws.subjects import state
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
-from urdfkin.verify.certificate import NOT_ASKED_FOR, Certificate, Comparison
+from urdfkin.verify.certificate import NOT_ASKED_FOR, BatchComparison, Certificate
 
 FRAME = "panda_hand"
 
@@ -173,16 +173,18 @@ def test_who_vouches_for_a_reading_is_said_where_somebody_does(reading: str) -> 
 
 @pytest.mark.parametrize("other", [0.5, 7.0, np.inf, np.nan])
 def test_a_share_that_is_no_number_is_kept_in_a_sum_of_comparisons(other: float) -> None:
-    wrong, right = Comparison(1, np.nan, np.nan, (3,)), Comparison(2, 1.0, other, (4,))
+    wrong, right = BatchComparison(1, np.nan, np.nan, (3,)), BatchComparison(2, 1.0, other, (4,))
     for both in (wrong + right, right + wrong):
         assert np.isnan(both.share)
         assert np.isnan(both.worst)
         assert not both.agrees
         assert both.results == 3
-    assert (wrong + Comparison.of_nothing()).index == (Comparison.of_nothing() + wrong).index == (3,)
+    assert (
+        (wrong + BatchComparison.of_nothing()).index == (BatchComparison.of_nothing() + wrong).index == (3,)
+    )
 
 
 def test_a_sum_of_equal_comparisons_has_the_index_of_the_first() -> None:
-    first, second = Comparison(1, 0.5, 0.5, (3,)), Comparison(1, 0.5, 0.5, (4,))
+    first, second = BatchComparison(1, 0.5, 0.5, (3,)), BatchComparison(1, 0.5, 0.5, (4,))
     assert (first + second).index == (3,)
     assert (second + first).index == (4,)

@@ -23,7 +23,7 @@ from urdfkin.errors import InstallationError, UnknownNameError
 from urdfkin.model.reference import Reference
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.verify import oracles, second_reader
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import pinocchio, version
@@ -323,7 +323,7 @@ def test_a_different_mimic_rule_is_reported(monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_bent_axis_fails_the_validation(monkeypatch: pytest.MonkeyPatch) -> None:
     plant(monkeypatch, *PLANTED["axis"][:2])
     (robot,) = validate(ARM, samples=0).robots
-    assert robot.verdict is Verdict.DISAGREES
+    assert robot.verdict is ValidationVerdict.DISAGREES
     assert "yourdfpy" in str(robot.reason)
     assert "joint turn: axis" in str(robot.reason)
     assert robot.failed == 0

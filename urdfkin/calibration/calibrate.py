@@ -38,7 +38,7 @@ from urdfkin.calibration.fit import (
     stacked,
     starting,
 )
-from urdfkin.calibration.parameters import Model, Parameter, table_model, urdf_model
+from urdfkin.calibration.parameters import CalibrationModel, Parameter, table_model, urdf_model
 from urdfkin.calibration.plausible import Ended, Plausibility, judge
 from urdfkin.calibration.write_back import Rewritten
 from urdfkin.comparison.result import length
@@ -105,7 +105,7 @@ class Calibration:
     """
 
     robot: Robot
-    model: Model
+    model: CalibrationModel
     identification: Identification
     general: Identification
     fitted: Fit | None = None
@@ -326,7 +326,7 @@ def fitted_model(
     )
 
 
-def _general_target(model: Model) -> FloatArray:
+def _general_target(model: CalibrationModel) -> FloatArray:
     """Return the model's parameters (p,), with a fitted target position that is on no joint axis."""
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
@@ -335,12 +335,12 @@ def _general_target(model: Model) -> FloatArray:
     return at
 
 
-def _values(model: Model, robot: Robot, q: FloatArray) -> FloatArray:
+def _values(model: CalibrationModel, robot: Robot, q: FloatArray) -> FloatArray:
     return model.coupling.values(model.coupling.select(robot.tree, q))
 
 
 def _check_measured(
-    robot: Robot, model: Model, q: ArrayLike, poses: ArrayLike
+    robot: Robot, model: CalibrationModel, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measured]:
     """Check `q` and `poses`; return the path's coordinates (s, c), and the poses as `Measured`."""
     T = checked_poses(poses)
@@ -363,7 +363,7 @@ def _check_measured(
 
 def _fit(
     robot: Robot,
-    model: Model,
+    model: CalibrationModel,
     q: FloatArray,
     measured: Measured,
     noise: tuple[float, float] | None,
@@ -403,7 +403,7 @@ def _fit(
     )
 
 
-def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
+def _significant(model: CalibrationModel, ended: Ended, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
     """Return the parameters to write, which always include base and tool, and their fit."""
     kept, found = ended.identification.kept, ended.fitted
     fixed = [model.way.parameters[k].end for k in kept]
@@ -422,7 +422,11 @@ def _significant(model: Model, ended: Ended, stated: Noise | None) -> tuple[tupl
 
 
 def _add_identifiable(
-    model: Model, measured: Measured, identification: Identification, stated: Noise | None, found: Fit
+    model: CalibrationModel,
+    measured: Measured,
+    identification: Identification,
+    stated: Noise | None,
+    found: Fit,
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values, if they significantly reduce the residuals.
 
@@ -454,7 +458,7 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 
 
 def _weak(
-    robot: Robot, model: Model, measured: Measured, kept: Sequence[int], at: FloatArray
+    robot: Robot, model: CalibrationModel, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
     """Return the poorly observable parameters, each with the ratio that `Calibration.weak` explains."""
     general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))

@@ -59,7 +59,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from urdfkin.calibration.parameters import Model
+from urdfkin.calibration.parameters import CalibrationModel
 from urdfkin.errors import InputError
 from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.rotation import euler_of, log_rotation
@@ -94,7 +94,9 @@ class Identification:
         return len(self.kept)
 
 
-def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray | None = None) -> FloatArray:
+def stacked(
+    model: CalibrationModel, values: FloatArray, *, complete: bool, at: FloatArray | None = None
+) -> FloatArray:
     """Return the Jacobian (rows, p) of all measured coordinates, in metres.
 
     The rows for rotations are multiplied by the length `way.size`, and are then in metres too. The arguments
@@ -109,7 +111,7 @@ def stacked(model: Model, values: FloatArray, *, complete: bool, at: FloatArray 
 
 
 def identify(
-    model: Model, values: FloatArray, *, complete: bool = True, at: FloatArray | None = None
+    model: CalibrationModel, values: FloatArray, *, complete: bool = True, at: FloatArray | None = None
 ) -> Identification:
     """Determine which parameters of a model are identifiable from the joint values (s, n).
 
@@ -147,7 +149,7 @@ def _most_independent(J: FloatArray, kept: Sequence[int], group: Sequence[int], 
     return sorted(chosen, key=list(group).index)
 
 
-def _reason(model: Model, J: FloatArray, error: FloatArray, kept: Sequence[int], k: int) -> str:
+def _reason(model: CalibrationModel, J: FloatArray, error: FloatArray, kept: Sequence[int], k: int) -> str:
     column = J[:, k]
     if np.linalg.norm(column) <= np.linalg.norm(error[:, k]):
         return "no effect on the measured numbers"
@@ -271,7 +273,7 @@ class Fit:
         return float(position), float(turn) if self.errors.shape[1] == 6 else None
 
 
-def errors(model: Model, measured: Measured, at: FloatArray) -> FloatArray:
+def errors(model: CalibrationModel, measured: Measured, at: FloatArray) -> FloatArray:
     """Return the residuals, measured minus computed: (s, 6) for poses or (s, 3) for positions.
 
     Each row contains the position error (m) and, for full poses, the rotation error (rad), along the axes of
@@ -288,7 +290,7 @@ def _apart(measured: Measured, T: FloatArray) -> FloatArray:
 
 
 def best_fit(
-    model: Model, measured: Measured, kept: Sequence[int], noise: Noise | None, at: FloatArray
+    model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, at: FloatArray
 ) -> Fit:
     """Fit the parameters `kept` to measurements by least squares, from the start values `at` (p,).
 
@@ -313,7 +315,7 @@ def best_fit(
     return found
 
 
-def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
+def _estimate_noise(found: Fit, model: CalibrationModel, measured: Measured) -> Noise:
     """Estimate the noise from the residuals; it is never below rounding error, because it is a divisor."""
     rounding = model.way.rounding(measured.values)
 
@@ -329,7 +331,7 @@ def _estimate_noise(found: Fit, model: Model, measured: Measured) -> Noise:
 
 
 def _whitened(
-    model: Model, measured: Measured, noise: Noise, at: FloatArray
+    model: CalibrationModel, measured: Measured, noise: Noise, at: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the residuals (rows,) divided by the noise, and the poses along the path."""
     frames = model.way.frames(measured.values, at)
@@ -337,7 +339,12 @@ def _whitened(
 
 
 def _whitened_columns(
-    model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray, frames: FloatArray
+    model: CalibrationModel,
+    measured: Measured,
+    kept: Sequence[int],
+    noise: Noise,
+    at: FloatArray,
+    frames: FloatArray,
 ) -> FloatArray:
     """Return the Jacobian (rows, k) of the fitted parameters, divided by the noise."""
     scale = noise.of(measured.complete)
@@ -347,7 +354,7 @@ def _whitened_columns(
 
 
 def _minimize(
-    model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
+    model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
 ) -> FloatArray:
     def moved(at: FloatArray, step: FloatArray) -> FloatArray:
         trial = at.copy()
@@ -362,7 +369,9 @@ def _minimize(
     )[0]
 
 
-def _evaluate(model: Model, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray) -> Fit:
+def _evaluate(
+    model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
+) -> Fit:
     r, frames = _whitened(model, measured, noise, at)
     J = _whitened_columns(model, measured, kept, noise, at, frames)
     k = noise.of(measured.complete).size
@@ -379,7 +388,7 @@ def _evaluate(model: Model, measured: Measured, kept: Sequence[int], noise: Nois
 
 
 def odd_poses(
-    model: Model, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
+    model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
 ) -> tuple[tuple[int, ...], Fit]:
     out = list[int]()
     # Without the outliers, there must still be more measured numbers than parameters.
@@ -445,7 +454,7 @@ _TURNS, _FIXED_END = 200, 1e-9
 _FARTHER = 100.0
 
 
-def starting(model: Model, measured: Measured) -> FloatArray:
+def starting(model: CalibrationModel, measured: Measured) -> FloatArray:
     """Return start values (p,): base and tool from the measured poses, other parameters from the model."""
     at = model.way.start.copy()
     places = {parameter.where for parameter in model.way.parameters if parameter.end}
@@ -528,7 +537,7 @@ def _translations(
     return found[:3] if base else nothing, found[-3:] if tool else nothing
 
 
-def demand_plausible(model: Model, measured: Measured) -> None:
+def demand_plausible(model: CalibrationModel, measured: Measured) -> None:
     """Raise InputError if measured positions spread 100 times more than the tip: they are not in metres."""
     T = model.way.poses(measured.values)
     ours, theirs = (

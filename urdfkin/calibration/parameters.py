@@ -29,13 +29,13 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.compiled.plan import turned
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.roundings import EPS, ROUNDINGS
 from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.mimic import Coupling
-from urdfkin.model.path import Motion, Path, elementary
+from urdfkin.model.path import ElementaryMotion, Path, elementary
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, inverse
 
 
@@ -60,7 +60,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Drive(Motion):
+class Drive(ElementaryMotion):
     """A motion whose angle or length is a parameter or a joint's value.
 
     Attributes:
@@ -98,7 +98,9 @@ class ParametricChain:
     def size(self) -> float:
         """Sum (m) of all lengths of the model, or 1 if it is 0; this length converts radians to metres."""
         lengths = [
-            float(np.linalg.norm(step[:3, 3])) for step in self.path.steps if not isinstance(step, Motion)
+            float(np.linalg.norm(step[:3, 3]))
+            for step in self.path.steps
+            if not isinstance(step, ElementaryMotion)
         ]
         slides = sum(
             abs(self.start[k]) for k, parameter in enumerate(self.parameters) if parameter.unit == "m"
@@ -167,7 +169,7 @@ _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class CalibrationModel:
     """A parametric chain, with its parameters grouped by joint.
 
     Attributes:
@@ -235,7 +237,7 @@ class Model:
         return push
 
 
-class _Maker:
+class _ModelBuilder:
     """Builder of a model: it collects the transforms and the parameters, from base to tip."""
 
     def __init__(self, fit: Collection[str]) -> None:
@@ -277,7 +279,7 @@ class _Maker:
         path: FrameChain | DHTable,
         ends: tuple[str, str],
         kept: Mapping[str, tuple[str, ...]],
-    ) -> Model:
+    ) -> CalibrationModel:
         """Return the model; `kept` lists the parameters of each joint in order of preference."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
         # Base and tool come first because they are unknown; the parameters of the joints are nearly known.
@@ -287,10 +289,10 @@ class _Maker:
             for place in sorted(places, key=lambda place: not place[1])
         )
         way = ParametricChain(Path(tuple(self.steps)), tuple(self.parameters), np.array(self.start))
-        return Model(way, groups, path.coupling, *ends, source)
+        return CalibrationModel(way, groups, path.coupling, *ends, source)
 
 
-def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> Model:
+def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
     """Make a parametric model of a URDF's path; `fit` selects the sets of parameters.
 
     The last fixed joint before the tip also has parameters. Other fixed joints have none, because parameters
@@ -298,7 +300,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     planar or floating joint on the path raises InputError.
     """
     path: FrameChain = chain(tree, tip, base)
-    maker, number = _Maker(fit), 0
+    maker, number = _ModelBuilder(fit), 0
     maker.end("base")
     steps = steps_between(tree, tip, base)
     last = max((i for i, (joint, _) in enumerate(steps) if joint.kind.has_axis), default=-1)
@@ -331,13 +333,13 @@ def _parameters_to_fit(fit: Collection[str], joint: Joint, *, ending: bool) -> C
     return (own,) if "offsets" in fit and joint.kind.has_axis else ()
 
 
-def table_model(table: DHTable, fit: Collection[str]) -> Model:
+def table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
     """Make the model of a table; an unknown set of parameters raises UnknownNameError.
 
     The set "origins" contains all cells. The set "offsets" contains the cells to which joint values are
     added.
     """
-    maker = _Maker(fit)
+    maker = _ModelBuilder(fit)
     maker.end("base")
     maker.steps.append(table.base)
     for i, row in enumerate(table.rows):
@@ -355,7 +357,7 @@ def table_model(table: DHTable, fit: Collection[str]) -> Model:
         gain = maker.parameter(row.joint, "gain", "") if "gains" in fit else None
         along = [*motions[:2], Drive(2, row.kind.turns, gain, i, float(row.sense))]
         between = motions[2:]
-        standard = table.convention is Convention.STANDARD
+        standard = table.convention is DHConvention.STANDARD
         maker.steps += [*along, *between] if standard else [*between, *along]
     maker.steps.append(table.tool)
     maker.end("tool")

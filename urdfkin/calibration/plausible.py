@@ -27,7 +27,7 @@ from urdfkin.calibration.fit import (
     identify,
     starting,
 )
-from urdfkin.calibration.parameters import Model, Parameter
+from urdfkin.calibration.parameters import CalibrationModel, Parameter
 from urdfkin.comparison.result import angle, length
 from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTree, far_outside
 
@@ -98,7 +98,7 @@ class Ended:
     fitted: Fit
 
 
-def judge(model: Model, ended: Ended, *, radians: bool) -> Plausibility:
+def judge(model: CalibrationModel, ended: Ended, *, radians: bool) -> Plausibility:
     """Check whether a fit is plausible, and find the likeliest mistake if it is not.
 
     `radians` says whether large joint angles are known to be radians.
@@ -148,7 +148,7 @@ def _too_few(ended: Ended) -> list[str]:
     ]
 
 
-def _reach(model: Model, ended: Ended) -> float:
+def _reach(model: CalibrationModel, ended: Ended) -> float:
     """Return the largest distance (m) of the tip from the base or any joint axis, in the original model."""
     T, columns = model.way.columns(ended.measured.values)
     turning = [k for k, p in enumerate(model.way.parameters) if p.what in ("rz", "theta")]
@@ -157,7 +157,7 @@ def _reach(model: Model, ended: Ended) -> float:
     return min(model.way.size, float(max(levers, away))) or model.way.size
 
 
-def _misfits(model: Model, ended: Ended) -> Iterator[str]:
+def _misfits(model: CalibrationModel, ended: Ended) -> Iterator[str]:
     """Yield a message if position residuals or orientation residuals are too large."""
     reach = _reach(model, ended)
     (metres, turn), (metres_before, _) = ended.fitted.rms(), ended.before.rms()
@@ -175,7 +175,7 @@ def _misfits(model: Model, ended: Ended) -> Iterator[str]:
         yield f"a large rms error of the orientations, {angle(turn)}"
 
 
-def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
+def _extreme_parameters(model: CalibrationModel, ended: Ended) -> Iterator[str]:
     """Yield a message if fitted tilts or gains are larger than those of any real robot."""
     tilted, gained = dict[str, str](), dict[str, str]()
     for parameter, moved, surely in _changes(model, ended):
@@ -189,7 +189,7 @@ def _extreme_parameters(model: Model, ended: Ended) -> Iterator[str]:
         yield f"the fit scales the values of joint {_list(gained.values())}"
 
 
-def _turned_zeros(model: Model, ended: Ended) -> list[str]:
+def _turned_zeros(model: CalibrationModel, ended: Ended) -> list[str]:
     """Return the joints whose zero changed by about half a turn, as after a sign error of the next joint."""
     return [
         f"{parameter.where!r} by {angle(abs(moved))}"
@@ -198,7 +198,7 @@ def _turned_zeros(model: Model, ended: Ended) -> list[str]:
     ]
 
 
-def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
+def _changes(model: CalibrationModel, ended: Ended) -> Iterator[tuple[Parameter, float, float]]:
     """Yield each fitted parameter of a moving joint, its change, and a lower bound of the change's size.
 
     The lower bound is the absolute value of the change, minus `_UNCERTAIN` standard deviations of the change.
@@ -220,7 +220,7 @@ def _changes(model: Model, ended: Ended) -> Iterator[tuple[Parameter, float, flo
             yield parameter, moved, abs(moved) - _UNCERTAIN * deviation
 
 
-def _out_of_range(model: Model, q: FloatArray) -> tuple[list[str], list[str]]:
+def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], list[str]]:
     """Return the joints with values that look like degrees, and other joints with values far outside limits.
 
     The first list contains the joints about which `configuration.warn_of_degrees` warns.
@@ -239,7 +239,7 @@ def _out_of_range(model: Model, q: FloatArray) -> tuple[list[str], list[str]]:
     return list(turned.values()), list(outside.values())
 
 
-def _coordinates(model: Model) -> Iterator[tuple[str, bool, float, float]]:
+def _coordinates(model: CalibrationModel) -> Iterator[tuple[str, bool, float, float]]:
     """Yield (name, is_angle, lower limit, upper limit) for each coordinate of the path."""
     kinds = dict(zip(model.coupling.joints, model.coupling.kinds, strict=True))
     for name in model.coupling.names:
@@ -265,7 +265,7 @@ class _Correction:
     last: int | None = None
 
 
-def _corrections(model: Model, q: FloatArray) -> Iterator[_Correction]:
+def _corrections(model: CalibrationModel, q: FloatArray) -> Iterator[_Correction]:
     turning = np.array([turns for _, turns, *_ in _coordinates(model)], dtype=bool)
     if turning.any():
         yield _Correction(
@@ -298,7 +298,7 @@ def _sign(names: Sequence[str]) -> str:
     return f"the signs of joints {_list(map(repr, names))} are wrong; negate their values or their axes"
 
 
-def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial | None:
+def _likeliest(model: CalibrationModel, ended: Ended, limit: float, reach: float) -> _Trial | None:
     """Return the first correction that gives a plausible fit with an error below the limit; else None."""
     trials = [_Trial(model, ended, correction, reach) for correction in _corrections(model, ended.q)]
     trials.sort(key=lambda trial: trial.left_before)
@@ -309,7 +309,7 @@ def _likeliest(model: Model, ended: Ended, limit: float, reach: float) -> _Trial
     return several if several is not None and several.is_plausible(limit) else None
 
 
-def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
+def _several_signs(model: CalibrationModel, ended: Ended, reach: float) -> _Trial | None:
     """Try two or more reversed signs.
 
     Each step reverses the joint whose reversal gives the smallest error. Only base and tool are fitted for
@@ -333,7 +333,7 @@ def _several_signs(model: Model, ended: Ended, reach: float) -> _Trial | None:
 
 
 class _Trial:
-    def __init__(self, model: Model, ended: Ended, correction: _Correction, reach: float) -> None:
+    def __init__(self, model: CalibrationModel, ended: Ended, correction: _Correction, reach: float) -> None:
         self.model, self.correction, self.reach = model, correction, reach
         chosen = slice(correction.first, correction.last)
         old = ended.measured

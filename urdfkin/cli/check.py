@@ -57,7 +57,7 @@ _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "b
 
 
 @dataclass(slots=True)
-class Outcome:
+class CheckOutcome:
     """The results of all files.
 
     Attributes:
@@ -92,7 +92,7 @@ class Outcome:
         self.excerpts += [excerpts.of(finding) for finding in found.findings]
 
 
-def print_outcome(outcome: Outcome, style: str, *, statistics: bool) -> None:
+def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> None:
     findings, version = outcome.findings, installed_version("urdfkin") or "0+unknown"
     if style == "json":
         click.echo(as_json(findings, outcome.files, version, outcome.silenced))
@@ -107,7 +107,7 @@ def print_outcome(outcome: Outcome, style: str, *, statistics: bool) -> None:
         _print_terminal(outcome, excerpts=style == "terminal")
 
 
-def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
+def _print_terminal(outcome: CheckOutcome, *, excerpts: bool) -> None:
     for finding, excerpt in zip(outcome.findings, outcome.excerpts, strict=True):
         place, rest = str(finding).split(f": {finding.code} ", 1)
         colour = {"fg": _COLOURS[finding.severity], "bold": True}
@@ -129,7 +129,7 @@ def _print_terminal(outcome: Outcome, *, excerpts: bool) -> None:
         say(f"run 'urdfkin explain {worst}' for details: {page(worst).title}")
 
 
-def _print_summary(outcome: Outcome) -> None:
+def _print_summary(outcome: CheckOutcome) -> None:
     asides = [
         f"silenced by comments: {len(outcome.silenced)}" if outcome.silenced else "",
         f"unchanged files: {outcome.unchanged}" if outcome.unchanged else "",
@@ -142,7 +142,7 @@ def _print_summary(outcome: Outcome) -> None:
     say(summary(outcome.findings, len(outcome.files)) + (f" ({aside})" if aside else ""))
 
 
-def _print_statistics(outcome: Outcome) -> None:
+def _print_statistics(outcome: CheckOutcome) -> None:
     for line in statistics(outcome.findings):
         say(line)
     _print_summary(outcome)
@@ -323,7 +323,7 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
     sys.exit(run.exit_code())
 
 
-def _put_outcome(outcome: Outcome, style: str, path: Path | None, *, statistics: bool) -> None:
+def _put_outcome(outcome: CheckOutcome, style: str, path: Path | None, *, statistics: bool) -> None:
     if path is None:
         print_outcome(outcome, style, statistics=statistics)
         return
@@ -333,7 +333,7 @@ def _put_outcome(outcome: Outcome, style: str, path: Path | None, *, statistics:
     write_file(path, text.getvalue().encode())
 
 
-def _run(settings: Settings, options: dict[str, Any]) -> Run:
+def _run(settings: Settings, options: dict[str, Any]) -> CheckRun:
     writing = options["write_baseline"] is not None
     known = None if writing or options["baseline"] is None else read_baseline(options["baseline"])
     since = options["changed_since"]
@@ -344,7 +344,7 @@ def _run(settings: Settings, options: dict[str, Any]) -> Run:
         mimic=how["mimic"],
         root_joint=how["root_joint"],
     )
-    return Run(
+    return CheckRun(
         look=look,
         choice=Choice(_chosen(options), options["notes"], settings, known),
         strict=options["strict"],
@@ -372,7 +372,7 @@ def _chosen(options: dict[str, Any]) -> frozenset[str]:
 
 
 @dataclass(slots=True)
-class Run:
+class CheckRun:
     """One check of many files.
 
     Attributes:
@@ -395,7 +395,7 @@ class Run:
     unsafe: bool
     version: Version | None
     accepting: bool
-    outcome: Outcome = field(default_factory=Outcome)
+    outcome: CheckOutcome = field(default_factory=CheckOutcome)
     _taken: set[str] = field(default_factory=set)
     _changed: dict[tuple[str, ...], bool] = field(default_factory=dict)
 
@@ -532,7 +532,7 @@ def _is_other(file: str) -> bool:
     return is_mjcf(file)
 
 
-def _write_baseline(run: Run, path: Path) -> None:
+def _write_baseline(run: CheckRun, path: Path) -> None:
     outcome = run.outcome
     if outcome.unreadable:
         return

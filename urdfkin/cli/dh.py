@@ -8,7 +8,7 @@ import click
 
 from urdfkin.cli.completion import complete_table
 from urdfkin.cli.options import (
-    Number,
+    FiniteNumber,
     Whole,
     load_robot,
     path_options,
@@ -68,7 +68,7 @@ choice_options = together(
     ),
     click.option(
         "--snap",
-        type=Number(),
+        type=FiniteNumber(),
         default=0.0,
         metavar="RAD",
         help="Round the table's angles to multiples of 15 degrees if they are within this tolerance.",
@@ -121,7 +121,7 @@ compare_options = together(
     ),
     click.option(
         "--tolerance",
-        type=Number(),
+        type=FiniteNumber(),
         default=0.2,
         show_default=True,
         metavar="MM",

@@ -24,7 +24,7 @@ from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import csv_value, json_text
 
 if TYPE_CHECKING:
-    from urdfkin.comparison.result import Question
+    from urdfkin.comparison.result import SameQuestion
     from urdfkin.robot import Robot
 
 _PATH = click.Path(path_type=Path, dir_okay=False)
@@ -107,7 +107,7 @@ def same_command(
     """
     from urdfkin.comparison.bounds import MOST  # noqa: PLC0415  --help stays fast
     from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
-    from urdfkin.comparison.result import Question  # noqa: PLC0415
+    from urdfkin.comparison.result import SameQuestion  # noqa: PLC0415
     from urdfkin.comparison.verdict import parse_map, same  # noqa: PLC0415
     from urdfkin.model.conventions import as_toml  # noqa: PLC0415
     from urdfkin.report.same import as_html, command_of, document, markdown_of  # noqa: PLC0415
@@ -117,7 +117,7 @@ def same_command(
     check_writable(*paths.values())
     if more:
         reject_unused_options(click.get_current_context(), _OF_TWO, "with more than two robots")
-        return _all_pairs((a, b, *more), Question(within, strict), MOST if boxes is None else boxes)
+        return _all_pairs((a, b, *more), SameQuestion(within, strict), MOST if boxes is None else boxes)
     first, second = load_several(a, b)
     robots = first, second
     with compiling():
@@ -125,7 +125,7 @@ def same_command(
             return _recheck(robots, recheck)
         how_many = MOST if boxes is None else boxes
         found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
-    question = Question(within, strict)
+    question = SameQuestion(within, strict)
     words = [word for pair in pairs for word in ("--map", pair)]
     words += ["--boxes", str(boxes)] if boxes is not None else []
     forms: dict[str, Callable[[], str]] = {
@@ -142,7 +142,7 @@ def same_command(
     return Answer(lambda: document(found, question, all_=all_), data, code=code)
 
 
-def _all_pairs(sources: tuple[str, ...], question: Question, boxes: int) -> Answer:
+def _all_pairs(sources: tuple[str, ...], question: SameQuestion, boxes: int) -> Answer:
     from urdfkin.comparison.certificate import certificate  # noqa: PLC0415  --help stays fast
     from urdfkin.comparison.verdict import same  # noqa: PLC0415
     from urdfkin.report.same import command_of, pairs_document, pairs_markdown  # noqa: PLC0415

@@ -19,7 +19,7 @@ import click
 
 from urdfkin.cli.completion import complete_frame, complete_robot
 from urdfkin.cli.streams import say
-from urdfkin.errors import InputError, Question, SourceError
+from urdfkin.errors import InputError, QuestionsSection, SourceError
 from urdfkin.errors.numbers import parse_float, parse_int, remedy
 from urdfkin.model.reference import Reference
 from urdfkin.system.files import MOST_DATA, read_standard_input, read_text, shortened
@@ -43,7 +43,7 @@ class Whole(click.IntRange):
         return super().convert(value, param, ctx)
 
 
-class Number(click.types.FloatParamType):
+class FiniteNumber(click.types.FloatParamType):
     """The type of a finite number."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -250,7 +250,7 @@ class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # the class is ge
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
-            self.fail(f"{error.message.rstrip('.')}; {Question.REFERENCE_FRAMES}", param, ctx)
+            self.fail(f"{error.message.rstrip('.')}; {QuestionsSection.REFERENCE_FRAMES}", param, ctx)
 
 
 reference_option = click.option(

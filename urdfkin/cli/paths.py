@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.options import (
-    Number,
+    FiniteNumber,
     Whole,
     convention_of_input_option,
     conversion_of,
@@ -31,7 +31,7 @@ from urdfkin.errors.display import Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
 
 if TYPE_CHECKING:
-    from urdfkin.dh.structure import Kind, Structure
+    from urdfkin.dh.structure import Structure, StructureKind
     from urdfkin.model.tree import FloatArray
 
 
@@ -177,7 +177,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     "urdfkin structure ur5 --tip tool0",
     click.option(
         "--opw",
-        type=Number(),
+        type=FiniteNumber(),
         metavar="MM",
         help="Print the parameters of an OPW solver as YAML. Fail if the tip deviates by more than MM (mm and"
         " mrad).",
@@ -241,7 +241,7 @@ def _document(found: Structure) -> TextDocument:
     return TextDocument(title, parts)
 
 
-def _kind(kind: Kind) -> str:
+def _kind(kind: StructureKind) -> str:
     near = f"{kind.radians:.3g} rad off" if kind.radians else f"{kind.metres * 1e3:.3g} mm off"
     off = "exactly" if kind.is_exact else near
     at = (

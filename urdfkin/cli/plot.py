@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.options import (
-    Number,
+    FiniteNumber,
     Whole,
     convention_of_input_option,
     conversion_of,
@@ -56,7 +56,7 @@ PANELS = (
 )
 @click.option(
     "--duration",
-    type=Number(),
+    type=FiniteNumber(),
     default=1.0,
     show_default=True,
     help="With --to: duration of the motion in seconds.",

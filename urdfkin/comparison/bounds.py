@@ -44,10 +44,10 @@ from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
     FramePair,
-    Line,
-    Pair,
+    LinearFunction,
+    MatchedJoints,
+    MatchedValues,
     Screw,
-    Step,
     Variables,
     apart,
 )
@@ -81,7 +81,7 @@ WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
-class Search:
+class DistanceSearch:
     """Search over the common variables of two aligned robots.
 
     If `as_written`, B's root stays at its pose, even if the matching begins at another link of B. Otherwise,
@@ -301,7 +301,7 @@ _Vectors = tuple[Support, Support]
 
 
 def curvature(
-    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
+    steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
     """Return the variables' names, and bounds (m) on the second derivatives of D by each pair of variables.
 
@@ -329,7 +329,7 @@ def curvature(
 
 
 def _second_derivatives(
-    steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables, frame: FramePair
+    steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> Iterator[tuple[int, int, float]]:
     """Yield i, j and a bound on the second derivative with respect to joints i and j, for all j <= i."""
     free = [_as_free_vectors(step) for step in steps]
@@ -350,7 +350,7 @@ def _second_derivatives(
 
 
 def _pass_to_front(
-    vectors: _Vectors, steps: Sequence[Step], pairs: Sequence[Pair], variables: Variables
+    vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
 ) -> float:
     """Return the largest length that d has at the base; `vectors` contains d and y at the last joint."""
     vectors = before_it(steps[-1], *vectors)
@@ -360,7 +360,9 @@ def _pass_to_front(
     return vectors[0].largest()
 
 
-def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Support) -> _Vectors:
+def _derivatives(
+    step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
+) -> _Vectors:
     """Return the derivatives of the vectors d and y with respect to a joint's value.
 
     The module's text defines d and y. The derivatives are expressed in the frame behind the joint's constant
@@ -373,7 +375,7 @@ def _derivatives(step: Step, pair: Pair, variables: Variables, d: Support, y: Su
     return _cross_products(step, d, y)
 
 
-def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
+def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
     """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B.
 
     If u and u' differ, their difference is added to the bound on u x d.
@@ -389,7 +391,7 @@ def _cross_products(step: Step, d: Support, y: Support) -> _Vectors:
     return bent, Support(d.grid, y.at(there) - there @ other.point)
 
 
-def _as_free_vectors(step: Step) -> Step:
+def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
     """Return a pair of matched joints without its translations, which do not affect free vectors."""
     axis = Screw(step.axis.direction, _ORIGIN)
     other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
@@ -411,7 +413,7 @@ class Boxes:
     names of the variables that change the distance (`moved_together` finds them).
     """
 
-    def __init__(self, search: Search, frame: FramePair, names: Sequence[str]) -> None:
+    def __init__(self, search: DistanceSearch, frame: FramePair, names: Sequence[str]) -> None:
         self.search = search
         self.at = [search.names.index(name) for name in names]
         self.middle = search.ends.mean(axis=1)
@@ -424,7 +426,11 @@ class Boxes:
         self.tool = inverse(frame.tool)[:3, 3]
         #: (nv, variables) derivatives of each robot's joint values by the variables.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
-        lines = {joint.name: Line(f"a:{joint.name}", 1.0, 0.0) for joint in trees[0].joints if joint.nv == 1}
+        lines = {
+            joint.name: LinearFunction(f"a:{joint.name}", 1.0, 0.0)
+            for joint in trees[0].joints
+            if joint.nv == 1
+        }
         for rates, tree, own in zip(self.rates, trees, (lines, search.variables.leaders), strict=True):
             for joint, line in own.items():
                 if line.variable in names:
@@ -460,7 +466,9 @@ class Boxes:
         return T[:, :3, 3] + lever, J[:, :3] + np.cross(J[:, 3:], lever[:, :, np.newaxis], axis=1)
 
 
-def tightened(search: Search, frame: FramePair, target: float, upper: float, most: int = MOST) -> float:
+def tightened(
+    search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MOST
+) -> float:
     """Return a proven upper bound (m) on a frame's distance, with at most `most` boxes at a time.
 
     If the search proves the bound `target`, the function returns `target`. Otherwise the function returns a
@@ -501,7 +509,7 @@ def tightened(search: Search, frame: FramePair, target: float, upper: float, mos
 
 def moved_together(
     found: Alignment, variables: Variables, frame: FramePair
-) -> tuple[list[Step], list[Pair | None]]:
+) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
 
     Most joints before the first difference of the models rotate D without a change of its length. A mimic
@@ -517,7 +525,7 @@ def moved_together(
     return steps[first:], pairs[first:]
 
 
-def _variables(pairs: Sequence[Pair | None]) -> set[str]:
+def _variables(pairs: Sequence[MatchedValues | None]) -> set[str]:
     lines = (line for pair in pairs if pair is not None for line in (pair.a, pair.b))
     return {line.variable for line in lines if line.slope}
 

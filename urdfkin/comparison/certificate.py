@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 
 import numpy as np
 
-from urdfkin.comparison.bounds import Search, own_results, pinocchios, tightened
+from urdfkin.comparison.bounds import DistanceSearch, own_results, pinocchios, tightened
 from urdfkin.comparison.result import Confirmation, ConfirmationState, Difference, Sameness, Verdict
 from urdfkin.comparison.verdict import CONFIRMED, Comparator
 from urdfkin.errors import InputError, UnknownNameError
@@ -27,7 +27,7 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
 from urdfkin.model.tree import JointKind, Mimic
 from urdfkin.robot import Robot
-from urdfkin.system.documents import Count, Header, Layout, Matrix, Size, of_length, plain, says
+from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, of_length, plain, says
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
 #: Largest number of boxes in memory while a bound of a certificate is proven again.
@@ -42,7 +42,7 @@ _LAST_BITS = 64.0
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
 
-class Model(TypedDict):
+class CertifiedModel(TypedDict):
     """Name and source of one of the two compared models."""
 
     name: Annotated[str, says("The robot's name.")]
@@ -51,7 +51,7 @@ class Model(TypedDict):
     ]
 
 
-class Rule(TypedDict):
+class CertifiedRule(TypedDict):
     """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
 
     leader: Annotated[str, says("Name of the mimicked joint.")]
@@ -60,7 +60,7 @@ class Rule(TypedDict):
 
 
 #: Value of a parameter in one of the two models.
-Value = str | float | list[str | float | None] | Rule | None
+Value = str | float | list[str | float | None] | CertifiedRule | None
 
 
 class DifferenceEntry(TypedDict):
@@ -85,7 +85,7 @@ class DifferenceEntry(TypedDict):
     ]
 
 
-class Conversion(TypedDict):
+class CertifiedConversion(TypedDict):
     """The conversion of a planar or floating joint's pose from A to B: before * (pose in A) * behind."""
 
     before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
@@ -95,7 +95,7 @@ class Conversion(TypedDict):
     ]
 
 
-class JointEntry(TypedDict):
+class CertifiedJoint(TypedDict):
     """A joint of A and the matching joint of B."""
 
     a: Annotated[str, says("Name of the joint in A.")]
@@ -105,7 +105,7 @@ class JointEntry(TypedDict):
         float, says("Constant `offset` in: value in B = `sense` * value in A + `offset`, rad or m.")
     ]
     conversion: Annotated[
-        Conversion | None,
+        CertifiedConversion | None,
         says("Conversion of a planar or floating joint's pose; null: no conversion is needed."),
     ]
 
@@ -163,11 +163,11 @@ class Confirmed(TypedDict):
     reason: Annotated[str, says("Reason why the oracle computed no distances; empty if it computed them.")]
 
 
-class Certificate(Header):
+class SameCertificate(Header):
     """A statement whether two models are the same robot, with the data for a proof. Units are m and rad."""
 
-    a: Model
-    b: Model
+    a: CertifiedModel
+    b: CertifiedModel
     up_to: Annotated[
         list[Literal["base", "zeros", "senses", "free joints", "tools"]],
         says("Kinds of changes that are applied to B so that the models agree best."),
@@ -179,7 +179,7 @@ class Certificate(Header):
         list[DifferenceEntry],
         says("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
     ]
-    joints: Annotated[list[JointEntry], says("Matched pairs of a joint of A and a joint of B.")]
+    joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
     links: Annotated[
         list[Annotated[list[str], of_length(2)]], says("Matched pairs of a link of A and a link of B.")
     ]
@@ -210,12 +210,12 @@ class Certificate(Header):
 
 
 #: The layout of the document.
-SAME = Layout(
-    "urdfkin-same/1", Certificate, tuple(v.value for v in Verdict), "urdfkin same A B --certificate FILE"
+SAME = DocumentKind(
+    "urdfkin-same/1", SameCertificate, tuple(v.value for v in Verdict), "urdfkin same A B --certificate FILE"
 )
 
 
-def certificate(found: Sameness, command: str | None = None) -> Certificate:
+def certificate(found: Sameness, command: str | None = None) -> SameCertificate:
     """Return the certificate: joint map, verdict, differences, and intervals; null: there is no bound."""
     a, b = ({"name": name, "source": source} for name, source in zip(found.names, found.sources, strict=True))
     document = {
@@ -229,7 +229,7 @@ def certificate(found: Sameness, command: str | None = None) -> Certificate:
         **{name: getattr(found, name) for name in _TAKEN_OVER},
         "rounding": dict(zip(("metres", "radians"), found.rounding, strict=True)),
     }
-    return cast("Certificate", plain(document))
+    return cast("SameCertificate", plain(document))
 
 
 #: Attributes of `Sameness` with the same name in the certificate.
@@ -248,7 +248,7 @@ def words_of(entry: DifferenceEntry) -> str:
     return Difference(entry["place"], entry["what"], a, b, *size, entry["detail"]).words
 
 
-def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
+def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models, and return its wrong statements; none: it is right.
 
     The certificate states which joints match, and how the coordinates of A are converted to those of B. The
@@ -280,7 +280,7 @@ def recheck(document: Certificate, a: Robot, b: Robot) -> list[str]:
         ) from error
 
 
-def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
+def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
     gauge = _gauge(document)
     if (why := _not_a_gauge(document, gauge, comparator)) is not None:
         yield why
@@ -312,7 +312,7 @@ def _errors(document: Certificate, comparator: Comparator) -> Iterator[str]:
     yield from _confirmation_errors(document["checked"], comparator, found, variables)
 
 
-def _statement_errors(document: Certificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
+def _statement_errors(document: SameCertificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
     """Yield errors in entries without a proof: names, verdict, differences, tools, and `DERIVED` entries."""
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
@@ -377,7 +377,7 @@ def _confirmation_errors(
         yield f"`checked`: Pinocchio finds at most {off:.2g} m, not {claimed['metres']:.2g} m"
 
 
-def _gauge(document: Certificate) -> Gauge:
+def _gauge(document: SameCertificate) -> Gauge:
     """Return the transforms, offsets and joint orders with which a certificate aligns B with A."""
     joints, base = document["joints"], document["base_links"]
     return Gauge(
@@ -393,7 +393,7 @@ def _gauge(document: Certificate) -> Gauge:
     )
 
 
-def _not_a_gauge(document: Certificate, gauge: Gauge, comparator: Comparator) -> str | None:
+def _not_a_gauge(document: SameCertificate, gauge: Gauge, comparator: Comparator) -> str | None:
     """Return the reason why the certificate's alignment of B with A is not allowed; None if it is allowed."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
@@ -457,7 +457,7 @@ def _as_written_errors(
 
 
 def _interval_errors(
-    search: Search,
+    search: DistanceSearch,
     frame: FramePair,
     claim: FrameEntry,
     rounding: tuple[float, float],
@@ -504,7 +504,7 @@ def _interval_errors(
 
 
 def _not_attained(
-    search: Search, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
+    search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
     """Yield the reasons why the lower bound of an interval is wrong.
 

@@ -49,7 +49,7 @@ Value = float | str
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ModelChange:
     """One changed attribute, or an element that only one version has.
 
     Attributes:
@@ -127,7 +127,7 @@ class Changes:
     """
 
     sources: tuple[str, str]
-    changes: tuple[Change, ...]
+    changes: tuple[ModelChange, ...]
     effects: tuple[Effect, ...]
     total: Interval | None
     rounding: tuple[float, float] | None = None
@@ -197,20 +197,20 @@ def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
     return Changes((old.source, new.source), changes, all_effects, total, rounding)
 
 
-def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[Change]:
+def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[ModelChange]:
     """Yield the differences of joints, then all other differences, then names and remarks."""
     for at in found.unexplained:
         if at.what and at.a is None:
-            yield Change(at.place, at.what, None, None, str(at.b))
+            yield ModelChange(at.place, at.what, None, None, str(at.b))
         elif at.what:
-            yield Change(at.place, at.what, at.a, at.b)
+            yield ModelChange(at.place, at.what, at.a, at.b)
     yield from _not_compared(found)
     for one in found.differences:
         if one.what not in BOUNDED or one.what == "fixed":
             yield from _change_of(one)
     for pair in found.joints:
         if pair.b not in spellings(pair.a) and pair.a not in spellings(pair.b):
-            yield Change(f"joint {pair.a}", "name", pair.a, pair.b)
+            yield ModelChange(f"joint {pair.a}", "name", pair.a, pair.b)
         a, b = (
             tree.joints[tree.joint_index(name)]
             for tree, name in zip(found.trees, (pair.a, pair.b), strict=True)
@@ -224,29 +224,29 @@ def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[Change]:
             yield from (change for change in _change_of(one) if not _is_world(found, formats, change))
 
 
-def _not_compared(found: Sameness) -> Iterator[Change]:
+def _not_compared(found: Sameness) -> Iterator[ModelChange]:
     """Yield the differences that `same` finds, if some joint of the models cannot be compared."""
     if found.up_to_single or (found.unexplained and all(one.what for one in found.unexplained)):
         return
     listed = {one.place for one in found.unexplained if one.what}
     for words in found.after:
-        yield Change("robot", "as a whole", None, None, words)
+        yield ModelChange("robot", "as a whole", None, None, words)
     for one in found.differences:
         if one.what in BOUNDED - {"fixed"} and one.place not in listed:
             sizes = [f"{length(one.metres)} off"] if one.metres else []
             sizes += [f"turned by {angle(one.radians)}"] if one.radians else []
-            yield Change(one.place, one.what, *one.values, " and ".join(sizes))
+            yield ModelChange(one.place, one.what, *one.values, " and ".join(sizes))
 
 
-def _is_world(found: Sameness, formats: tuple[str, str], change: Change) -> bool:
+def _is_world(found: Sameness, formats: tuple[str, str], change: ModelChange) -> bool:
     """Return whether a change is only the link "world", which the readers of MJCF and USD add as the root."""
     roots = [tree.links[0] for tree, name in zip(found.trees, formats, strict=True) if name != "URDF"]
     return change.element == "link world" and "world" in roots
 
 
-def _change_of(one: Difference) -> Iterator[Change]:
+def _change_of(one: Difference) -> Iterator[ModelChange]:
     if one.what not in ("only in A", "only in B"):
-        yield Change(one.place, one.what, *one.values)
+        yield ModelChange(one.place, one.what, *one.values)
         return
     names = [one.place]
     if one.place.startswith("links "):
@@ -255,7 +255,7 @@ def _change_of(one: Difference) -> Iterator[Change]:
     for name in names:
         tag = name.partition(" ")[0]
         old, new = (tag, None) if one.what == "only in A" else (None, tag)
-        yield Change(name, "", old, new)
+        yield ModelChange(name, "", old, new)
 
 
 def _renamed(found: Sameness) -> KinematicTree:
@@ -277,22 +277,22 @@ def _renamed(found: Sameness) -> KinematicTree:
     return KinematicTree(tree.name, tuple(links.get(link, link) for link in tree.links), made)
 
 
-def _changes(old: str, new: str) -> Iterator[Change]:
+def _changes(old: str, new: str) -> Iterator[ModelChange]:
     before, after = plain_xml(old), plain_xml(new)
     if before.get("name") != after.get("name"):
-        yield Change("robot", "name", before.get("name"), after.get("name"))
+        yield ModelChange("robot", "name", before.get("name"), after.get("name"))
     for tag in ("joint", "link"):
         was, now = ({str(e.get("name")): e for e in root.findall(tag)} for root in (before, after))
         for name in dict.fromkeys([*was, *now]):
             element = f"{tag} {name}"
             if name not in was or name not in now:
                 old_tag, new_tag = (tag if name in there else None for there in (was, now))
-                yield Change(element, "", old_tag, new_tag)
+                yield ModelChange(element, "", old_tag, new_tag)
                 continue
             facts, others = (_facts(e, tag) for e in (was[name], now[name]))
             for what in dict.fromkeys([*facts, *others]):
                 if facts.get(what) != others.get(what):
-                    yield Change(element, what, facts.get(what), others.get(what))
+                    yield ModelChange(element, what, facts.get(what), others.get(what))
 
 
 def _facts(element: Element, tag: str) -> dict[str, Value]:

@@ -42,7 +42,7 @@ _QUOTED = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class ReaderDifference:
     """A joint that a library reads differently, and the element of the file that explains the difference.
 
     `size` is the largest difference of an entry of the child link's pose in the parent link (m, or rotation
@@ -76,7 +76,7 @@ class LibraryReading:
     same_order: bool = False
     missing: tuple[str, ...] = ()
     worst: float = 0.0
-    differences: tuple[Difference, ...] = ()
+    differences: tuple[ReaderDifference, ...] = ()
 
     @property
     def agrees(self) -> bool:
@@ -235,7 +235,7 @@ def _differences(
     elements: Mapping[str, Any],
     own: Sequence[str],
     equal: float,
-) -> Iterator[Difference]:
+) -> Iterator[ReaderDifference]:
     """Yield the joints with another pose of the child link in the parent link."""
     for i, joint in enumerate(robot.tree.joints, 1):
         if i not in theirs or joint.parent not in theirs:
@@ -245,7 +245,7 @@ def _differences(
         size = float(np.abs(T - found).max())
         if not size <= equal:
             element, words = _explained(joint, title, T, found, elements.get(joint.name), own, equal)
-            yield Difference(joint.name, element, words, size)
+            yield ReaderDifference(joint.name, element, words, size)
 
 
 def _explained(

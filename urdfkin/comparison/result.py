@@ -23,8 +23,8 @@ from urdfkin.model.mechanisms.mechanism import (
     Alignment,
     FramePair,
     JointTransform,
+    MatchedJoints,
     Mechanism,
-    Step,
     Tolerance,
     Variables,
     apart,
@@ -64,7 +64,7 @@ BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class SameQuestion:
     """A yes-or-no question about two models: whether they are equivalent, or within a distance of each other.
 
     Attributes:
@@ -454,7 +454,7 @@ class Sameness(Displayable):
         """
         return {one.what for one in self.differences} <= BOUNDED and max(self.written) <= most
 
-    def holds(self, question: Question) -> bool:
+    def holds(self, question: SameQuestion) -> bool:
         """Return whether the answer to a question is yes.
 
         >>> import urdfkin
@@ -480,7 +480,7 @@ class Sameness(Displayable):
         >>> found.exit_code(), found.exit_code(within=1.0)
         (1, 0)
         """
-        return int(not self.holds(Question(within, strict)))
+        return int(not self.holds(SameQuestion(within, strict)))
 
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert A's configurations (..., nq) to the corresponding configurations (..., nq) of B.
@@ -715,7 +715,9 @@ def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
     return before, {link for link in body if not carried[link]}
 
 
-def _conversion_words(found: Alignment, step: Step, made: JointTransform, rounding: Tolerance) -> str:
+def _conversion_words(
+    found: Alignment, step: MatchedJoints, made: JointTransform, rounding: Tolerance
+) -> str:
     names = found.b.tree.joints[step.b].name, found.a.tree.joints[step.a].name
     own = f"the {'inverse of the ' if made.back else ''}pose of q[{names[1]}]"
     M, N = (
@@ -819,7 +821,7 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
     return some
 
 
-def _beyond(one: Step | FramePair, rounding: Tolerance) -> tuple[float, float]:
+def _beyond(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
     """Return the tilt (rad) and shift (m) of a joint or frame between A and B; 0 if within rounding."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
 

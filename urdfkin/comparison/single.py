@@ -69,8 +69,8 @@ import numpy as np
 from urdfkin.comparison.result import JointDifference, angle, length
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
+    MatchedJoints,
     Screw,
-    Step,
     Tolerance,
     apart,
     between,
@@ -180,7 +180,7 @@ class JointComparison:
                 )
             yield from beyond
 
-    def _between(self, step: Step, axis: Screw, other: Screw) -> tuple[float, float]:
+    def _between(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
         """Return the angle of two axes, and the distance of one axis' point from the other axis.
 
         The point of an axis may lie anywhere on this axis.
@@ -249,7 +249,7 @@ class JointComparison:
                 why = "follows a planar or floating joint with another frame"
                 yield JointDifference(name, "", None, why)
 
-    def _of_rule(self, step: Step) -> Iterator[JointDifference]:
+    def _of_rule(self, step: MatchedJoints) -> Iterator[JointDifference]:
         """Yield each difference of two mimic rules that exceeds rounding."""
         trees = self.found.a.tree, self.found.b.tree
         a, b = trees[0].joints[step.a].mimic, trees[1].joints[step.b].mimic

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.comparison.bounds import MOST, Search, pinocchios, tightened
+from urdfkin.comparison.bounds import MOST, DistanceSearch, pinocchios, tightened
 from urdfkin.comparison.result import (
     BOUNDED,
     FREE,
@@ -320,8 +320,8 @@ class Comparator:
                     remedy="also map the joints before these joints, or remove this pair",
                 )
 
-    def search(self, found: Alignment, variables: Variables, *, as_written: bool = False) -> Search:
-        return Search(self.robots, found, variables, as_written=as_written)
+    def search(self, found: Alignment, variables: Variables, *, as_written: bool = False) -> DistanceSearch:
+        return DistanceSearch(self.robots, found, variables, as_written=as_written)
 
     def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
         """Bound the distance and the angle (m, rad) between two frames that differ only by rounding.
@@ -390,7 +390,11 @@ class Comparator:
         return uppers
 
     def _sharpen(
-        self, uppers: list[tuple[float, float]], frames: Sequence[FramePair], search: Search, target: float
+        self,
+        uppers: list[tuple[float, float]],
+        frames: Sequence[FramePair],
+        search: DistanceSearch,
+        target: float,
     ) -> None:
         """Prove with boxes that no two matching frames are farther apart than a target (m)."""
         for _ in uppers:
@@ -421,7 +425,7 @@ class Comparator:
         self,
         found: Alignment,
         frame: FramePair,
-        search: Search,
+        search: DistanceSearch,
         seen: tuple[float, FloatArray] | None,
         upper: tuple[float, float],
     ) -> Interval:

@@ -26,7 +26,7 @@ from urdfkin.compiled.plan import (
     REFERENCES,
     CompiledTree,
     KernelArgs,
-    Program,
+    KernelProgram,
     address,
     lines,
     program_of,
@@ -49,7 +49,7 @@ _MOST_STAGED = 3072
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
 
 
-class How(TypedDict, total=False):
+class EvaluateOptions(TypedDict, total=False):
     """Keyword arguments of every function of this module.
 
     Attributes:
@@ -65,14 +65,18 @@ class How(TypedDict, total=False):
     read: bool
 
 
-def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[How]) -> FloatArray:
+def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[EvaluateOptions]) -> FloatArray:
     """Return T_world_frame (n, frames, 4, 4): the positions by equation 7.77, and the rotations."""
     program = program_of(plan, turned=True)
     return _compute("placements", plan, program, [q], _ALIGNED, (4, 4), **how)
 
 
 def velocities(
-    plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
+    plan: CompiledTree,
+    q: FloatArray,
+    v: FloatArray,
+    reference: Reference = _ALIGNED,
+    **how: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return velocities (n, frames, 6), [linear; angular], by equations 7.127 and 7.128."""
     local = reference.own_axes
@@ -86,7 +90,7 @@ def accelerations(
     v: FloatArray,
     a: FloatArray,
     reference: Reference = _ALIGNED,
-    **how: Unpack[How],
+    **how: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return classical accelerations (n, frames, 6), [linear; angular], by equations 7.129 and 7.130."""
     local = reference.own_axes
@@ -95,7 +99,7 @@ def accelerations(
 
 
 def jacobians(
-    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
+    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[EvaluateOptions]
 ) -> FloatArray:
     """Return Jacobians (n, frames, 6, nv) by equation 7.85."""
     program = program_of(plan, turned=reference.own_axes, columns=True)
@@ -103,7 +107,11 @@ def jacobians(
 
 
 def jacobian_rates(
-    plan: CompiledTree, q: FloatArray, v: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
+    plan: CompiledTree,
+    q: FloatArray,
+    v: FloatArray,
+    reference: Reference = _ALIGNED,
+    **how: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return time derivatives J-dot of Jacobians (n, frames, 6, nv) by equation 7.126."""
     program = program_of(plan, turned=reference.own_axes, columns=True)
@@ -111,7 +119,7 @@ def jacobian_rates(
 
 
 def hessians(
-    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[How]
+    plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[EvaluateOptions]
 ) -> FloatArray:
     """Return Hessians (n, frames, 6, nv, nv).
 
@@ -128,7 +136,7 @@ def imus(
     a: FloatArray,
     *,
     gravity: FloatArray,
-    **how: Unpack[How],
+    **how: Unpack[EvaluateOptions],
 ) -> FloatArray:
     """Return [proper acceleration; angular velocity] (n, frames, 6) in each frame's own axes.
 
@@ -143,7 +151,7 @@ def imus(
 def _compute(
     name: str,
     plan: CompiledTree,
-    program: Program,
+    program: KernelProgram,
     inputs: Sequence[FloatArray],
     reference: Reference,
     shape: tuple[int, ...],
@@ -170,7 +178,7 @@ def _compute(
 
 def _interpreted(
     name: str,
-    program: Program,
+    program: KernelProgram,
     reference: Reference,
     inputs: Sequence[FloatArray],
     out: FloatArray,
@@ -200,7 +208,7 @@ def _interpreted(
 
 
 def _lists(
-    program: Program, reference: Reference, inputs: Sequence[FloatArray], i: int, result: list[float]
+    program: KernelProgram, reference: Reference, inputs: Sequence[FloatArray], i: int, result: list[float]
 ) -> list[Any]:
     """Return the arguments with which Python runs a recursion for configuration `i`."""
     task: list[Any] = [0] * len(KernelArgs)
@@ -217,7 +225,7 @@ def _lists(
 
 def _compiled(
     name: str,
-    program: Program,
+    program: KernelProgram,
     reference: Reference,
     inputs: Sequence[FloatArray],
     out: FloatArray,
@@ -247,7 +255,12 @@ def is_staged(out: FloatArray) -> bool:
 
 
 def task_of(
-    program: Program, reference: Reference, inputs: Sequence[FloatArray], out: FloatArray, *, staged: bool
+    program: KernelProgram,
+    reference: Reference,
+    inputs: Sequence[FloatArray],
+    out: FloatArray,
+    *,
+    staged: bool,
 ) -> tuple[NDArray[np.int64], object]:
     """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished.
 

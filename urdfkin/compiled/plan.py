@@ -35,7 +35,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, pose
 IntArray = NDArray[np.int64]
 
 
-class Step(IntEnum):
+class StepField(IntEnum):
     """Columns of `CompiledTree.steps` (integers)."""
 
     KIND = 0
@@ -43,8 +43,8 @@ class Step(IntEnum):
     V = 2
 
 
-class Motion(IntEnum):
-    """The kinds of moving joints: the values in the column `Step.KIND`."""
+class JointMotion(IntEnum):
+    """The kinds of moving joints: the values in the column `StepField.KIND`."""
 
     TURN = 0
     SLIDE = 1
@@ -65,7 +65,7 @@ class Geometry(IntEnum):
     CONSTANT = 13
 
 
-class Column(IntEnum):
+class ColumnField(IntEnum):
     """Integers that describe one Jacobian column (eq. 7.85): a row of `CompiledTree.columns`."""
 
     STEP = 0
@@ -75,20 +75,20 @@ class Column(IntEnum):
 
 
 _MOTION = {
-    JointKind.REVOLUTE: Motion.TURN,
-    JointKind.CONTINUOUS: Motion.TURN,
-    JointKind.PRISMATIC: Motion.SLIDE,
-    JointKind.PLANAR: Motion.PLANAR,
-    JointKind.FLOATING: Motion.FLOATING,
+    JointKind.REVOLUTE: JointMotion.TURN,
+    JointKind.CONTINUOUS: JointMotion.TURN,
+    JointKind.PRISMATIC: JointMotion.SLIDE,
+    JointKind.PLANAR: JointMotion.PLANAR,
+    JointKind.FLOATING: JointMotion.FLOATING,
 }
 
 #: A planar joint, for example, has two translations and a rotation.
 #: A motion is the index of its axis in the joint's frame, and True for a rotation or False for a translation.
-_RATES: dict[Motion, tuple[tuple[int, bool], ...]] = {
-    Motion.TURN: ((2, True),),
-    Motion.SLIDE: ((2, False),),
-    Motion.PLANAR: ((0, False), (1, False), (2, True)),
-    Motion.FLOATING: ((0, False), (1, False), (2, False), (0, True), (1, True), (2, True)),
+_RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
+    JointMotion.TURN: ((2, True),),
+    JointMotion.SLIDE: ((2, False),),
+    JointMotion.PLANAR: ((0, False), (1, False), (2, True)),
+    JointMotion.FLOATING: ((0, False), (1, False), (2, False), (0, True), (1, True), (2, True)),
 }
 
 
@@ -102,14 +102,14 @@ class CompiledTree:
         nq: Length of `q`.
         nv: Length of `v` and `a`.
         joints: Indices of the moving joints in the tree's list of joints.
-        steps: (steps, 3) integers, columns `Step`.
+        steps: (steps, 3) integers, columns `StepField`.
         geometry: (steps, 14), columns `Geometry`.
         frames: (frames, 2) integers for each frame: the index of the last moving joint before the frame, and
             the frame's index in the output. The first integer is -1 if no joint moves the frame. The array is
             sorted by the first integer.
         offsets: (frames, 12) rotation matrix (9 numbers) and translation (3 numbers) of each frame, relative
             to the frame of its last moving joint.
-        columns: (columns, 4) integers for each Jacobian column, see `Column`. A planar joint has three
+        columns: (columns, 4) integers for each Jacobian column, see `ColumnField`. A planar joint has three
             columns, and a floating joint has six.
         multipliers: (columns,) the mimic multiplier of each column's joint; 1 for a joint that mimics no
             other joint.
@@ -165,7 +165,7 @@ class CompiledTree:
     @cached_property
     def turns_only(self) -> bool:
         """Whether every moving joint is revolute; the sum of the link lengths to a frame is then constant."""
-        return bool((self.steps[:, Step.KIND] == Motion.TURN).all())
+        return bool((self.steps[:, StepField.KIND] == JointMotion.TURN).all())
 
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
@@ -185,7 +185,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
     parents = [anchors[tree.joints[i].parent].step for i in needed]
     columns, multipliers = _columns(steps, geometry)
     leaders = _leaders(columns, parents, [anchors[link].step for link in links])
-    places = zip(steps[:, Step.Q].tolist(), needed, strict=True)
+    places = zip(steps[:, StepField.Q].tolist(), needed, strict=True)
     order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)
     ends = [anchors[links[place]] for place in order]
     return CompiledTree(
@@ -265,14 +265,14 @@ def _flat(T: FloatArray) -> FloatArray:
 def _steps(
     tree: KinematicTree, needed: Sequence[int], anchors: dict[int, _Anchor]
 ) -> tuple[IntArray, FloatArray]:
-    steps = np.full((len(needed), len(Step)), -1, dtype=np.int64)
+    steps = np.full((len(needed), len(StepField)), -1, dtype=np.int64)
     geometry = np.zeros((len(needed), Geometry.CONSTANT + 1))
     for row, i in enumerate(needed):
         joint = tree.joints[i]
         T_step_joint = anchors[joint.parent].T @ joint.T_parent_joint @ turned(joint)
-        steps[row, Step.KIND] = _MOTION[joint.kind]
-        steps[row, Step.Q] = tree.q_index[i]
-        steps[row, Step.V] = tree.v_index[i]
+        steps[row, StepField.KIND] = _MOTION[joint.kind]
+        steps[row, StepField.Q] = tree.q_index[i]
+        steps[row, StepField.V] = tree.v_index[i]
         geometry[row, : Geometry.MULTIPLIER] = _flat(T_step_joint)
         rule = joint.mimic
         geometry[row, Geometry.MULTIPLIER :] = (1.0, 0.0) if rule is None else (rule.multiplier, rule.offset)
@@ -281,12 +281,12 @@ def _steps(
 
 def _columns(steps: IntArray, geometry: FloatArray) -> tuple[IntArray, FloatArray]:
     rows = [
-        (row, axis, int(turns), step[Step.V] + place)
+        (row, axis, int(turns), step[StepField.V] + place)
         for row, step in enumerate(steps)
-        for place, (axis, turns) in enumerate(_RATES[Motion(step[Step.KIND])])
+        for place, (axis, turns) in enumerate(_RATES[JointMotion(step[StepField.KIND])])
     ]
-    columns = np.array(rows, dtype=np.int64).reshape(-1, len(Column))
-    return columns, geometry[columns[:, Column.STEP], Geometry.MULTIPLIER].copy()
+    columns = np.array(rows, dtype=np.int64).reshape(-1, len(ColumnField))
+    return columns, geometry[columns[:, ColumnField.STEP], Geometry.MULTIPLIER].copy()
 
 
 def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> IntArray:
@@ -299,8 +299,8 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
             step = parents[step]
         first: dict[int, int] = {}
         for c, column in enumerate(rows):
-            if column[Column.STEP] in ancestors:
-                leaders[frame, c] = first.setdefault(column[Column.V], c)
+            if column[ColumnField.STEP] in ancestors:
+                leaders[frame, c] = first.setdefault(column[ColumnField.V], c)
     return leaders
 
 
@@ -368,15 +368,15 @@ STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
 PAIR_WIDTH = 4
 
 _JOINTS = {
-    Motion.TURN: Op.REVOLUTE,
-    Motion.SLIDE: Op.PRISMATIC,
-    Motion.PLANAR: Op.PLANAR,
-    Motion.FLOATING: Op.FLOATING,
+    JointMotion.TURN: Op.REVOLUTE,
+    JointMotion.SLIDE: Op.PRISMATIC,
+    JointMotion.PLANAR: Op.PLANAR,
+    JointMotion.FLOATING: Op.FLOATING,
 }
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class KernelProgram:
     """The program of a kernel.
 
     Attributes:
@@ -402,7 +402,9 @@ class Program:
         return words, list(map(Number, self.constants.tolist()))
 
 
-def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False) -> Program:
+def program_of(
+    plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False
+) -> KernelProgram:
     """Return the program for the frames of a compiled tree, which stores the program for later calls.
 
     Args:
@@ -414,7 +416,7 @@ def program_of(plan: CompiledTree, *, turned: bool, columns: bool = False, pairs
             computed from all pairs of Jacobian columns.
     """
     key = turned, columns, pairs
-    made: Program | None = plan.made.get(key)
+    made: KernelProgram | None = plan.made.get(key)
     if made is None:
         made = plan.made[key] = _Writer(plan, *key).program()
     return made
@@ -436,19 +438,19 @@ class _Writer:
         self.sums = self.results + COLUMN_ROWS * len(plan.columns) * columns
         self.saved = self.sums + COLUMN_ROWS * len(plan.columns) * pairs
         self.rules = [self._rule(i) for i in range(len(plan.steps))]
-        parts = _blocks(plan.places_q), _blocks(plan.columns[:, Column.V].tolist()), self._angles()
+        parts = _blocks(plan.places_q), _blocks(plan.columns[:, ColumnField.V].tolist()), self._angles()
         self.lists = [number for part in parts for number in part]
         begins = np.cumsum([len(Head), *map(len, parts)]).tolist()
         lists = [*begins[:3], begins[2], begins[3]]
         self.head = [0, plan.nq, plan.nv, len(plan.frames), *lists, self.q, self.v, self.a, self.base]
 
-    def program(self) -> Program:
+    def program(self) -> KernelProgram:
         self._write()
         self._put(Op.END)
         rows = self.saved + STATE_ROWS * len(self.slots)
         self.head[Head.CODE] = len(self.head) + len(self.lists)
         words = [*self.head, *self.lists, *(word for line in self.code for word in line)]
-        return Program(np.array(words, dtype=np.int64), np.array(self.constants), rows)
+        return KernelProgram(np.array(words, dtype=np.int64), np.array(self.constants), rows)
 
     def _write(self) -> None:
         """Write the instructions for all joints and frames, from the base outwards."""
@@ -463,9 +465,11 @@ class _Writer:
                 self._step(step)
                 now = step
                 while (
-                    self.columns and c < len(self.plan.columns) and self.plan.columns[c, Column.STEP] == step
+                    self.columns
+                    and c < len(self.plan.columns)
+                    and self.plan.columns[c, ColumnField.STEP] == step
                 ):
-                    self._put(Op.KEEP, self.kept + KEPT_ROWS * c, int(self.plan.columns[c, Column.AXIS]))
+                    self._put(Op.KEEP, self.kept + KEPT_ROWS * c, int(self.plan.columns[c, ColumnField.AXIS]))
                     c += 1
                 self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
@@ -526,10 +530,10 @@ class _Writer:
         """Return the list of joint angles, with `ANGLE_WIDTH` integers for each."""
         angles = []
         for i, step in enumerate(self.plan.steps):
-            kind, q = Motion(step[Step.KIND]), self.q + int(step[Step.Q])
-            if kind in (Motion.TURN, Motion.PLANAR):
+            kind, q = JointMotion(step[StepField.KIND]), self.q + int(step[StepField.Q])
+            if kind in (JointMotion.TURN, JointMotion.PLANAR):
                 angles += [
-                    q + 2 * (kind is Motion.PLANAR),
+                    q + 2 * (kind is JointMotion.PLANAR),
                     self.sines + 2 * i,
                     self.rules[i],
                     int(self.rules[i] > 0),
@@ -539,9 +543,9 @@ class _Writer:
     def _step(self, i: int) -> None:
         geometry, step = self.plan.geometry[i], self.plan.steps[i]
         self._rigid(geometry[:9].reshape(3, 3), geometry[Geometry.OFFSET : Geometry.MULTIPLIER])
-        op, rule, sine = _JOINTS[Motion(step[Step.KIND])], self.rules[i], self.sines + 2 * i
-        first = sine if op is Op.REVOLUTE else self.q + int(step[Step.Q])
-        self._put(op, first, int(step[Step.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
+        op, rule, sine = _JOINTS[JointMotion(step[StepField.KIND])], self.rules[i], self.sines + 2 * i
+        first = sine if op is Op.REVOLUTE else self.q + int(step[StepField.Q])
+        self._put(op, first, int(step[StepField.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
 
     def _frame(self, f: int) -> bool:
         """Add the instructions for a frame's results; return whether they overwrite the joint's state."""
@@ -561,7 +565,7 @@ class _Writer:
                 multiplier = float(self.plan.multipliers[c])
                 follows = 0 if multiplier == 1.0 else self._constants(multiplier)
                 to = c if self.pairs else leader
-                how = int(self.plan.columns[c, Column.TURNS]) + 2 * (to != c)
+                how = int(self.plan.columns[c, ColumnField.TURNS]) + 2 * (to != c)
                 rows = self.kept + KEPT_ROWS * c, self.results + COLUMN_ROWS * to
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
@@ -570,7 +574,7 @@ class _Writer:
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
-            sources[:, plan.columns[c, Column.V]] = row + COLUMN_ROWS * c + np.arange(6)
+            sources[:, plan.columns[c, ColumnField.V]] = row + COLUMN_ROWS * c + np.arange(6)
         return sources.ravel().tolist()
 
     def _pairs(self, f: int) -> list[int]:
@@ -582,7 +586,9 @@ class _Writer:
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
         rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
-        pairs = np.column_stack((rows[0], columns[own, Column.STEP], columns[own, Column.V], rows[1]))
+        pairs = np.column_stack(
+            (rows[0], columns[own, ColumnField.STEP], columns[own, ColumnField.V], rows[1])
+        )
         return [len(own), *pairs.ravel().tolist(), *self._sources(f, self.sums)]
 
 
@@ -651,7 +657,7 @@ def address(x: NDArray[Any]) -> int:
     return found
 
 
-def scratch(program: Program) -> FloatArray:
+def scratch(program: KernelProgram) -> FloatArray:
     """Return memory for the intermediate results of one run of a program."""
     return lines(program.rows * LANES)
 

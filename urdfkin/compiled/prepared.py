@@ -27,7 +27,7 @@ from urdfkin.system.locks import importing
 Fast = Callable[..., FloatArray | None]
 
 
-class _Robot(Protocol):
+class _PreparedRobot(Protocol):
     """The methods and attributes of `Robot` that a prepared frame uses."""
 
     tree: Any
@@ -77,7 +77,13 @@ class PreparedFrame:
     )  # fmt: skip
 
     def __init__(
-        self, robot: _Robot, frame: str, reference: Reference, plan: CompiledTree, *, verify: bool = False
+        self,
+        robot: _PreparedRobot,
+        frame: str,
+        reference: Reference,
+        plan: CompiledTree,
+        *,
+        verify: bool = False,
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan

@@ -5,12 +5,12 @@ from urdfkin.dh.export import FORMATS, export
 from urdfkin.dh.make import dh_table
 from urdfkin.dh.parse_table import read_table
 from urdfkin.dh.rows import table_from_mapping, table_from_rows
-from urdfkin.dh.table import Convention, DHRow, DHTable, SnapChange, SnapReport
+from urdfkin.dh.table import DHConvention, DHRow, DHTable, SnapChange, SnapReport
 from urdfkin.dh.units import Units, units_of
 
 __all__ = [
     "FORMATS",
-    "Convention",
+    "DHConvention",
     "DHRow",
     "DHTable",
     "SnapChange",

@@ -71,7 +71,7 @@ class NearParallel(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class AxisTransform:
     """The seven numbers of the transform between two joint axes, in metres and radians.
 
     Attributes:
@@ -87,7 +87,7 @@ class Step:
     delta_next: float
     free: bool = False
 
-    def turned(self) -> Step:
+    def turned(self) -> AxisTransform:
         """Return the numbers for the same two axes and the opposite direction of x."""
         alpha = math.pi if self.alpha == math.pi else -self.alpha
         phi, phi_next = self.phi + math.pi, self.phi_next - math.pi
@@ -107,9 +107,9 @@ def step_between(
     near_parallel: NearParallel,
     phi_free: float = 0.0,
     delta_each: bool = False,
-    noise: Noise | None = None,
-) -> Step:
-    """Factor the constant pose between two joint axes into the seven numbers of a `Step`.
+    noise: PoseTolerance | None = None,
+) -> AxisTransform:
+    """Factor the constant pose between two joint axes into the seven numbers of a `AxisTransform`.
 
     Args:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
@@ -131,12 +131,12 @@ def step_between(
     return feet
 
 
-def _is_near(feet: Step, sine: float, reach: float) -> bool:
+def _is_near(feet: AxisTransform, sine: float, reach: float) -> bool:
     far = max(abs(feet.delta), abs(feet.delta_next)) > reach
     return sine < NEARLY_PARALLEL or (sine < FAR_FEET and far)
 
 
-def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
+def _skew(A: FloatArray, sine: float, reach: float, noise: PoseTolerance) -> AxisTransform:
     """Return the numbers of the transform between two skew axes.
 
     The x axis points along the cross product of z and z_next. The length a is positive, or 0 if the axes
@@ -148,11 +148,13 @@ def _skew(A: FloatArray, sine: float, reach: float, noise: Noise) -> Step:
     delta_next = cleaned_length(-across / sine, reach, noise.metres)
     delta = cleaned_length(A[2, 3] - delta_next * A[2, 2], reach, noise.metres)
     a, alpha = cleaned_length(along, reach, noise.metres), cleaned_angle(math.atan2(sine, A[2, 2]))
-    step = Step(phi, delta, a, alpha, 0.0, _remaining_rotation(A, phi, alpha, 0.0), delta_next)
+    step = AxisTransform(phi, delta, a, alpha, 0.0, _remaining_rotation(A, phi, alpha, 0.0), delta_next)
     return step.turned() if a < 0.0 else step
 
 
-def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_each: bool) -> Step:
+def _parallel(
+    A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float, delta_each: bool
+) -> AxisTransform:
     """Return the numbers of the transform between two parallel axes.
 
     The x axis is along the perpendicular through the origin of this joint's frame. If the axes coincide, they
@@ -164,10 +166,12 @@ def _parallel(A: FloatArray, reach: float, noise: Noise, phi_free: float, delta_
     delta, delta_next = (offset, 0.0) if delta_each else (0.0, sign * offset)
     a = cleaned_length(math.hypot(A[0, 3], A[1, 3]), reach, noise.metres)
     phi = math.atan2(A[1, 3], A[0, 3]) if a else phi_free
-    return Step(phi, delta, a, alpha, 0.0, _remaining_rotation(A, phi, alpha, 0.0), delta_next, free=not a)
+    return AxisTransform(
+        phi, delta, a, alpha, 0.0, _remaining_rotation(A, phi, alpha, 0.0), delta_next, free=not a
+    )
 
 
-def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> Step:
+def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float) -> AxisTransform:
     """Return the numbers of the transform between two axes for a Hayati row (Hayati, 1983).
 
     Consider the plane through the origin of this joint's frame, normal to this joint's axis. The x axis
@@ -182,7 +186,9 @@ def hayati_step(A: FloatArray, reach: float, noise: Noise, phi_free: float) -> S
     y = math.cos(phi) * z[1] - math.sin(phi) * z[0]
     alpha = cleaned_angle(math.atan2(-y, z[2]))
     beta = cleaned_angle(math.atan2(x, math.hypot(y, z[2])))
-    return Step(phi, 0.0, a, alpha, beta, _remaining_rotation(A, phi, alpha, beta), delta_next, free=not a)
+    return AxisTransform(
+        phi, 0.0, a, alpha, beta, _remaining_rotation(A, phi, alpha, beta), delta_next, free=not a
+    )
 
 
 def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
@@ -229,7 +235,7 @@ class PairLike:
     A: FloatArray
     row: DHRow
     reach: float
-    noise: Noise
+    noise: PoseTolerance
     near_parallel: NearParallel
 
     @property
@@ -284,7 +290,7 @@ class PairLike:
         cut = float(p[2] + (there - p[0] * x - p[1] * y) * z)
         return cut if abs(cut) <= self.reach else None
 
-    def step(self, carry: float, d: float, phi_free: float = 0.0) -> Step:
+    def step(self, carry: float, d: float, phi_free: float = 0.0) -> AxisTransform:
         """Return the numbers of the transform between the two axes.
 
         `carry` is the offset (metres) along the first axis from the DH frame to the joint's frame. `d` is the
@@ -311,7 +317,7 @@ class PairLike:
 
 def steps_like(
     pairs: Sequence[PairLike], phi_in: float, carry: float, tip: float | None
-) -> tuple[list[Step], list[float]]:
+) -> tuple[list[AxisTransform], list[float]]:
     """Compute the transforms between consecutive axes of a path, and theta of each row.
 
     If a number can be chosen freely, the function copies the number from another table. `phi_in` (rad) and
@@ -320,7 +326,7 @@ def steps_like(
     table. If `tip` is None, these two numbers may differ, and the last row or the tool contains the
     difference.
     """
-    steps, inputs = list[Step](), list[tuple[float, float]]()
+    steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
         inputs.append((carry, _offset_without_foot(pairs, i, carry, tip)))
         steps.append(pair.step(*inputs[-1]))
@@ -365,7 +371,9 @@ def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: f
     return cleaned_length(carry - pair.passed_back(target), pair.reach, pair.noise.metres)
 
 
-def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int, phi_in: float) -> float:
+def _phi_of_coinciding(
+    pairs: Sequence[PairLike], steps: Sequence[AxisTransform], i: int, phi_in: float
+) -> float:
     """Return phi for two coinciding axes, for which any value of phi is correct.
 
     The function chooses phi so that theta of this row, or of the prismatic rows after it, equals theta in the
@@ -386,15 +394,15 @@ def _phi_of_coinciding(pairs: Sequence[PairLike], steps: Sequence[Step], i: int,
     return phi
 
 
-def _closer_direction(step: Step, pair: PairLike, phi_in: float = 0.0) -> Step:
-    """Return the `Step` with the direction of x for which the cells are closer to the other table.
+def _closer_direction(step: AxisTransform, pair: PairLike, phi_in: float = 0.0) -> AxisTransform:
+    """Return the `AxisTransform` with the direction of x for which the cells are closer to the other table.
 
     The function compares the cells a, alpha and beta with the same cells of the other table. If the two
     directions of x are equally close, the function compares theta.
     """
     row = pair.row
 
-    def unlike(one: Step) -> tuple[float, float]:
+    def unlike(one: AxisTransform) -> tuple[float, float]:
         apart = abs(math.remainder(one.alpha - row.alpha, 2.0 * math.pi)) + abs(one.beta - row.beta)
         turned = abs(math.remainder(phi_in + one.phi - row.theta, 2.0 * math.pi))
         return round(abs(one.a - row.a) / (pair.reach or 1.0) + apart, 6), turned
@@ -439,14 +447,14 @@ def _check_length(where: str, length: float) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class PoseTolerance:
     """Largest angle (radians) and length (metres) that are treated as rounding errors in a constant pose."""
 
     radians: float
     metres: float
 
 
-def noise_of(joints: int, length: float, reach: float) -> Noise:
+def noise_of(joints: int, length: float, reach: float) -> PoseTolerance:
     """Return the largest angle and length that are treated as rounding errors in a constant pose.
 
     The pose is the product of the origins of `joints` URDF joints; `length` is the sum of their offsets
@@ -456,10 +464,10 @@ def noise_of(joints: int, length: float, reach: float) -> Noise:
         (63.7, 4.0)
     """
     computed = (AXES + CONSTANT * joints) * EPS
-    return Noise(computed + WRITTEN * joints * EPS, max(SUMMED * EPS * reach, computed * length))
+    return PoseTolerance(computed + WRITTEN * joints * EPS, max(SUMMED * EPS * reach, computed * length))
 
 
-def noises(chain: FrameChain, reach: float) -> list[Noise]:
+def noises(chain: FrameChain, reach: float) -> list[PoseTolerance]:
     return [
         noise_of(joints, float(length), reach)
         for joints, length in zip(chain.folded, chain.lengths, strict=True)

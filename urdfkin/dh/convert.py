@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.table import Convention, DHRow, DHTable, as_step, convention_of
+from urdfkin.dh.table import DHConvention, DHRow, DHTable, as_step, convention_of
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -43,7 +43,7 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     wanted = convention_of(convention)
     if wanted is table.convention or not table.rows:
         return replace(table, convention=wanted)
-    return to_modified(table) if wanted is Convention.MODIFIED else to_standard(table)
+    return to_modified(table) if wanted is DHConvention.MODIFIED else to_standard(table)
 
 
 def to_modified(table: DHTable) -> DHTable:
@@ -51,7 +51,7 @@ def to_modified(table: DHTable) -> DHTable:
     first = as_step(table.base)
     steps = [(*(first or (0.0, 0.0)), 0.0), *((row.a, row.alpha, row.beta) for row in table.rows[:-1])]
     base = np.eye(4) if first else table.base
-    return _with(table, Convention.MODIFIED, steps, base, table.rows[-1].X @ table.tool)
+    return _with(table, DHConvention.MODIFIED, steps, base, table.rows[-1].X @ table.tool)
 
 
 def to_standard(table: DHTable) -> DHTable:
@@ -59,12 +59,12 @@ def to_standard(table: DHTable) -> DHTable:
     last = as_step(table.tool)
     steps = [*((row.a, row.alpha, row.beta) for row in table.rows[1:]), (*(last or (0.0, 0.0)), 0.0)]
     tool = np.eye(4) if last else table.tool
-    return _with(table, Convention.STANDARD, steps, table.base @ table.rows[0].X, tool)
+    return _with(table, DHConvention.STANDARD, steps, table.base @ table.rows[0].X, tool)
 
 
 def _with(
     table: DHTable,
-    convention: Convention,
+    convention: DHConvention,
     steps: list[tuple[float, float, float]],
     base: FloatArray,
     tool: FloatArray,
@@ -132,7 +132,7 @@ def frame_poses(table: DHTable) -> list[FloatArray]:
     """
     S = [row.S for row in table.rows]
     X = [row.X for row in table.rows]
-    if table.convention is Convention.STANDARD:
+    if table.convention is DHConvention.STANDARD:
         ways = [s @ x for s, x in zip(S, X, strict=True)]
         poses = [np.eye(4), *ways]
         poses[0], poses[-1] = table.base @ poses[0], poses[-1] @ table.tool

@@ -23,10 +23,10 @@ import numpy as np
 
 from urdfkin.dh.common_normals import (
     NEARLY_PARALLEL,
+    AxisTransform,
     NearParallel,
-    Noise,
     PairLike,
-    Step,
+    PoseTolerance,
     cleaned_angle,
     cleaned_length,
     lifted,
@@ -36,7 +36,7 @@ from urdfkin.dh.common_normals import (
     steps_like,
     tilt_of,
 )
-from urdfkin.dh.table import Convention, DHRow, DHTable, along_axis, as_step, between_axes
+from urdfkin.dh.table import DHConvention, DHRow, DHTable, along_axis, as_step, between_axes
 from urdfkin.errors import InputError
 from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import ChainJoint, FrameChain
@@ -90,7 +90,7 @@ class ParallelOffset(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    convention: Convention = Convention.STANDARD
+    convention: DHConvention = DHConvention.STANDARD
     near_parallel: NearParallel = NearParallel.HAYATI
     last: Last = Last.TIP
     parallel_offset: ParallelOffset = ParallelOffset.LAST
@@ -156,14 +156,14 @@ def _table(
     chain: FrameChain,
     choices: Choices,
     turns: list[tuple[float, float]],
-    steps: list[Step],
+    steps: list[AxisTransform],
     ends: tuple[FloatArray, FloatArray],
 ) -> DHTable:
-    if choices.convention is Convention.MODIFIED and turns:
+    if choices.convention is DHConvention.MODIFIED and turns:
         first = as_step(ends[0])
         a, alpha = first or (0.0, 0.0)
         ends = (np.eye(4) if first else ends[0], ends[1])
-        steps = [Step(0.0, 0.0, a, alpha, 0.0, 0.0, 0.0), *steps[:-1]]
+        steps = [AxisTransform(0.0, 0.0, a, alpha, 0.0, 0.0, 0.0), *steps[:-1]]
     rows = [
         _row(joint, turn, step, -1 if joint.name in choices.flip else 1)
         for joint, turn, step in zip(chain.joints, turns, steps, strict=True)
@@ -171,7 +171,7 @@ def _table(
     return DHTable(choices.convention, tuple(rows), *ends, chain.robot, chain.base, chain.tip)
 
 
-def _row(joint: ChainJoint, turn: tuple[float, float], step: Step, sense: int) -> DHRow:
+def _row(joint: ChainJoint, turn: tuple[float, float], step: AxisTransform, sense: int) -> DHRow:
     theta, d = turn
     # The sum with 0.0 makes a negative zero positive.
     a, alpha, d, theta, beta = (x + 0.0 for x in (step.a, step.alpha, d, theta, step.beta))
@@ -234,7 +234,7 @@ def _onto_neighbour(constants: list[FloatArray], k: int, slides: list[bool]) -> 
     return False
 
 
-def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[Noise]) -> bool:
+def _meets_neighbour(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
     """Move joint k's line to the origin of a neighbouring joint if the two axes are nearly parallel."""
     before, after = constants[k], constants[k + 1]
     if k > 0 and noise[k].radians < tilt_of(before) < NEARLY_PARALLEL:
@@ -264,7 +264,7 @@ def _shift_before(constants: list[FloatArray], k: int, offset: FloatArray) -> No
 # -- the pass ------------------------------------------------------------------------------------------
 
 
-def _frame_zero(A: FloatArray, reach: float, noise: Noise) -> tuple[FloatArray, float, float]:
+def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[FloatArray, float, float]:
     """Return T_base_0; also the angle about z_0, and the offset along z_0, from frame 0 to joint 1."""
     z, p = A[:3, 2], A[:3, 3]
     offset = cleaned_length(float(z @ p), reach, noise.metres)
@@ -294,11 +294,11 @@ def _steps(
     carry: float,
     reach: float,
     choices: Choices,
-    noise: Sequence[Noise],
-) -> tuple[list[Step], list[float]]:
+    noise: Sequence[PoseTolerance],
+) -> tuple[list[AxisTransform], list[float]]:
     """Return the transforms between consecutive axes, and theta of each row."""
     each = choices.parallel_offset is not ParallelOffset.LAST
-    steps, thetas = list[Step](), list[float]()
+    steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
         step = step_between(lifted(A, carry), reach, choices.near_parallel, -phi_in, each, rounding)
         theta = cleaned_angle(phi_in + step.phi)
@@ -311,7 +311,9 @@ def _steps(
     return steps, thetas
 
 
-def _offset_for_last_row(like: DHTable, A: FloatArray, choices: Choices, noise: Noise) -> float | None:
+def _offset_for_last_row(
+    like: DHTable, A: FloatArray, choices: Choices, noise: PoseTolerance
+) -> float | None:
     """Return the offset (metres) before the last row with which d of this row is equal in the two tables.
 
     The result is None if d cannot be equal, for example because the other table has a tool.
@@ -342,8 +344,8 @@ def _first_like(
 
 
 def _last_like(
-    like: DHTable, theta: float, d: float, last: Step, tool: FloatArray
-) -> tuple[float, float, Step, FloatArray]:
+    like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
+) -> tuple[float, float, AxisTransform, FloatArray]:
     """Return the numbers of the last row, and the tool.
 
     If theta of the last row is equal in the two tables, and neither table has a tool, the numbers are
@@ -361,10 +363,10 @@ def _last_like(
     tool[:3, 3] = [cleaned_length(float(x), like.span or 1.0) for x in tool[:3, 3]]
     if np.abs(tool - np.eye(4)).max() <= ANGLE * EPS:
         tool = np.eye(4)
-    return row.theta, height, Step(0.0, 0.0, row.a, row.alpha, 0.0, 0.0, 0.0), tool
+    return row.theta, height, AxisTransform(0.0, 0.0, row.a, row.alpha, 0.0, 0.0, 0.0), tool
 
 
-def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
+def _needs_reversal(step: AxisTransform, theta: float, sign: Sign) -> bool:
     """Whether the rule `sign` requires the opposite direction of x.
 
     With the rule "a", the cell a must be 0 or positive; if a is 0, then alpha must be 0 or positive. With the
@@ -376,21 +378,21 @@ def _needs_reversal(step: Step, theta: float, sign: Sign) -> bool:
     return (step.a or by_alpha) < 0.0 if sign is Sign.A else (by_alpha or step.a) < 0.0
 
 
-def _representable(A: FloatArray, choices: Choices, noise: Noise) -> bool:
+def _representable(A: FloatArray, choices: Choices, noise: PoseTolerance) -> bool:
     """Whether A is a product Rz Tz Tx Rx (standard) or Rz Tz (modified), so that no tool is needed."""
     if choices.last is Last.FLANGE:
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
-    if choices.convention is Convention.MODIFIED:
+    if choices.convention is DHConvention.MODIFIED:
         aside = math.hypot(A[0, 3], A[1, 3])
         return tilt_of(A) <= noise.radians and A[2, 2] > 0.0 and aside <= 2.0 * noise.metres
     return bool(x_along_z <= noise.radians and lateral <= 2.0 * noise.metres)
 
 
 def _last(
-    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: Noise
-) -> tuple[float, float, Step, FloatArray]:
-    """Return theta and d of the last row, the `Step` with its other cells, and the tool.
+    A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: PoseTolerance
+) -> tuple[float, float, AxisTransform, FloatArray]:
+    """Return theta and d of the last row, the `AxisTransform` with its other cells, and the tool.
 
     `A` is the tip's pose in the last joint's frame, shifted along z to the origin O_{n-1}.
     """
@@ -398,7 +400,7 @@ def _last(
         phi = math.atan2(A[1, 0], A[0, 0])
         a = cleaned_length(A[0, 0] * A[0, 3] + A[1, 0] * A[1, 3], reach, noise.metres)
         alpha = cleaned_angle(math.atan2(A[2, 1], A[2, 2]))
-        step = Step(phi, 0.0, a, alpha, 0.0, 0.0, 0.0)
+        step = AxisTransform(phi, 0.0, a, alpha, 0.0, 0.0, 0.0)
         return cleaned_angle(phi_in + phi), cleaned_length(A[2, 3], reach, noise.metres), step, np.eye(4)
     d = cleaned_length(carry if choices.last is Last.FLANGE else A[2, 3], reach, noise.metres)
     tool = A.copy()
@@ -409,10 +411,10 @@ def _last(
         tool = turn @ tool
     _clean_rotation(tool)
     tool[:3, 3] = [cleaned_length(component, reach, noise.metres) for component in tool[:3, 3]]
-    return 0.0, d, Step(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), tool
+    return 0.0, d, AxisTransform(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), tool
 
 
-def _offsets_first(rows: list[tuple[float, float]], steps: list[Step]) -> list[tuple[float, float]]:
+def _offsets_first(rows: list[tuple[float, float]], steps: list[AxisTransform]) -> list[tuple[float, float]]:
     """Add the offsets along consecutive parallel axes, and write the sum into the first row of these axes.
 
     The offset along the second of two axes is added if alpha = 0, and subtracted if alpha = pi.

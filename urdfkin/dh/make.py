@@ -23,8 +23,8 @@ from urdfkin.dh.compare.fit import align
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import Choices, First, Last, ParallelOffset, Sign, Slide, choice, derive
 from urdfkin.dh.snapping import checked_tolerance, row_of_constant, snap_chain, snap_thetas, statement
-from urdfkin.dh.table import Convention, DHTable, convention_of
-from urdfkin.errors import InputError, Question, UnknownNameError
+from urdfkin.dh.table import DHConvention, DHTable, convention_of
+from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
@@ -40,7 +40,7 @@ def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTa
 
     The attribute `flip` of `choices` must contain the joints from `reversed_like`.
     """
-    standard = replace(choices, convention=Convention.STANDARD)
+    standard = replace(choices, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
 
 
@@ -61,7 +61,7 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
     best, flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
     for senses in dict.fromkeys(patterns):
         reversed_ = tuple(name for name, sense in zip(names, senses, strict=True) if sense < 0)
-        found = derive(chain, replace(choices, convention=Convention.STANDARD, flip=reversed_), there)
+        found = derive(chain, replace(choices, convention=DHConvention.STANDARD, flip=reversed_), there)
         if (key := _difference_key(found, there, chain.reach or 1.0)) < best:
             best, flip = key, reversed_
     if best[0] > _ANOTHER:
@@ -70,7 +70,7 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
             found=f"cells of the table that differ by {best[0]:.0%} of the reach, or by {best[0]:.2g} rad",
             remedy="compare the table with the URDF by --compare, which reports the differences",
-            question=Question.DH_AND_URDF_DISAGREE,
+            question=QuestionsSection.DH_AND_URDF_DISAGREE,
         )
     return flip
 

@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.dh.table import DHRow, DHTable, convention_of, looks_round
 from urdfkin.dh.units import Angles, Cell, NoCellError, Units, cell_in_si, cell_of, read_number, units_of
-from urdfkin.errors import InputError, Question, UnknownNameError
+from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.validators import safe_repr
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic
 
@@ -420,7 +420,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
         raise InputError(
             "the table does not name its convention",
             remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
-            question=Question.WHICH_DH_CONVENTION,
+            question=QuestionsSection.WHICH_DH_CONVENTION,
         )
     check_keys([key for key in data if key not in NOTES], _TABLE_KEYS, "a table")
     options = {key: data[key] for key in _TABLE_KEYS if key in data and key not in ("convention", "rows")}

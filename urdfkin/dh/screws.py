@@ -30,7 +30,7 @@ from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
-from urdfkin.model.path import Motion, Path
+from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -170,10 +170,10 @@ class ProductOfExponentials(Displayable):
         >>> screws.path.poses(np.zeros(2))[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
-        steps, R, p = list[FloatArray | Motion](), np.eye(3), np.zeros(3)
+        steps, R, p = list[FloatArray | ElementaryMotion](), np.eye(3), np.zeros(3)
         for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
             along = axis_aligning(screw[:3] if joint.kind.turns else screw[3:])
-            steps += [pose(R.T @ along, R.T @ (point - p)), Motion(2, joint.kind.turns)]
+            steps += [pose(R.T @ along, R.T @ (point - p)), ElementaryMotion(2, joint.kind.turns)]
             R, p = along, point
         return Path((*steps, pose(R.T @ self.M[:3, :3], R.T @ (self.M[:3, 3] - p))))
 

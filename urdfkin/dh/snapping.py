@@ -20,7 +20,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.table import Convention, DHTable, SnapChange, SnapReport, nearest_twelfth, wrapped
+from urdfkin.dh.table import DHConvention, DHTable, SnapChange, SnapReport, nearest_twelfth, wrapped
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import real_number
 from urdfkin.kinematics.rotation import coordinate_rotation
@@ -229,7 +229,7 @@ def row_of_constant(table: DHTable, k: int) -> int:
         return -1
     if k == n:
         return n - 1 if np.array_equal(table.tool, np.eye(4)) else n
-    return k - 1 if table.convention is Convention.STANDARD else k
+    return k - 1 if table.convention is DHConvention.STANDARD else k
 
 
 #: A mimicked joint that is not on the path is assumed to be in this range (rad or metres).

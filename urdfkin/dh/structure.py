@@ -39,7 +39,7 @@ import numpy as np
 from urdfkin.dh.derive import Choices, Last, derive
 from urdfkin.dh.make import derive_like, reversed_like
 from urdfkin.dh.screws import ProductOfExponentials
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import axis_range, values_within
@@ -57,7 +57,7 @@ _SAMPLES = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class AxisPair:
     """The angle (at most pi/2) and the distance between two consecutive joint axes.
 
     The distance is 0 if one of the two joints is prismatic.
@@ -70,7 +70,7 @@ class Pair:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class StructureKind:
     """A geometric property of some consecutive joints, for example "spherical wrist".
 
     Attributes:
@@ -109,8 +109,8 @@ class Structure:
     tip_frame: str
     joints: str
     freedoms: int
-    pairs: tuple[Pair, ...]
-    kinds: tuple[Kind, ...]
+    pairs: tuple[AxisPair, ...]
+    kinds: tuple[StructureKind, ...]
     reach: float
     reached: float
     solvers: tuple[str, ...]
@@ -145,7 +145,7 @@ def _axis(screws: ProductOfExponentials, i: int) -> FloatArray:
     return w if w.any() else screws.space[i, 3:]
 
 
-def _pair(screws: ProductOfExponentials, i: int) -> Pair:
+def _pair(screws: ProductOfExponentials, i: int) -> AxisPair:
     z, following = _axis(screws, i), _axis(screws, i + 1)
     cross = np.cross(z, following)
     angle = math.atan2(float(np.linalg.norm(cross)), abs(float(z @ following)))
@@ -158,7 +158,7 @@ def _pair(screws: ProductOfExponentials, i: int) -> Pair:
             else abs(cross @ between) / np.sin(angle)
         )
         distance = float(across)
-    return Pair(screws.joints[i].name, screws.joints[i + 1].name, angle, distance)
+    return AxisPair(screws.joints[i].name, screws.joints[i + 1].name, angle, distance)
 
 
 def meeting(screws: ProductOfExponentials, at: tuple[int, ...]) -> tuple[FloatArray, float]:
@@ -175,7 +175,7 @@ def meeting(screws: ProductOfExponentials, at: tuple[int, ...]) -> tuple[FloatAr
 # -- kinds ---------------------------------------------------------------------------------------------
 
 
-def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...]) -> list[Kind]:
+def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[AxisPair, ...]) -> list[StructureKind]:
     found = []
     for i in range(len(letters) - 2):
         if letters[i : i + 3] != "RRR":
@@ -183,29 +183,31 @@ def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...
         names = tuple(joint.name for joint in screws.joints[i : i + 3])
         tilt = max(pairs[i].angle, pairs[i + 1].angle)
         if tilt <= NEAR_ANGLE:
-            found.append(Kind("three parallel axes", names, radians=tilt))
+            found.append(StructureKind("three parallel axes", names, radians=tilt))
         elif min(pairs[i].angle, pairs[i + 1].angle) > NEAR_ANGLE:
             point, off = meeting(screws, (i, i + 1, i + 2))
             if off <= NEAR_LENGTH:
                 where = " wrist" if i == len(letters) - 3 else " shoulder" if i == 0 else " joint"
                 name = "spherical" + where
-                found.append(Kind(name, names, metres=off, at=tuple(float(x) for x in point)))
+                found.append(StructureKind(name, names, metres=off, at=tuple(float(x) for x in point)))
     return found
 
 
-def _arm_kinds(screws: ProductOfExponentials, letters: str, pairs: tuple[Pair, ...]) -> list[Kind]:
+def _arm_kinds(
+    screws: ProductOfExponentials, letters: str, pairs: tuple[AxisPair, ...]
+) -> list[StructureKind]:
     names = tuple(joint.name for joint in screws.joints)
     tilt = max((pair.angle for pair in pairs), default=0.0)
     if sorted(letters) == ["P", "R", "R", "R"] and tilt <= NEAR_ANGLE:
-        return [Kind("SCARA", names, radians=tilt)]
+        return [StructureKind("SCARA", names, radians=tilt)]
     if letters[:3] == "PPP":
         off = max(abs(float(_axis(screws, i) @ _axis(screws, k))) for i, k in ((0, 1), (1, 2), (0, 2)))
         if off <= NEAR_ANGLE:
-            return [Kind("gantry", names[:3], radians=math.asin(off))]
+            return [StructureKind("gantry", names[:3], radians=math.asin(off))]
     return []
 
 
-def _solvers(letters: str, kinds: list[Kind], pairs: tuple[Pair, ...]) -> list[str]:
+def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
     """Return the known closed-form solutions.
 
     If the arm has a property only approximately, the closed-form solution has a small error.
@@ -397,7 +399,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
             DHRow(a[i], _ALPHA[i], d[i], _THETA[i], JointKind.REVOLUTE, joint.name)
             for i, joint in enumerate(path.joints)
         ]
-        yield DHTable(Convention.STANDARD, tuple(made))
+        yield DHTable(DHConvention.STANDARD, tuple(made))
 
 
 def _read(table: DHTable) -> Opw:

@@ -33,34 +33,34 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.dh.units import Units, units_of
-from urdfkin.errors import InputError, Question
+from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.errors.display import Displayable
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.roundings import ANGLE, EPS, of_rows
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
-from urdfkin.model.path import Motion, Path
+from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen, is_rigid
 from urdfkin.system.lazy_import import hook
 
 
-class Convention(StrEnum):
+class DHConvention(StrEnum):
     """The convention of a table: joint i has the axis z_{i-1} (standard, distal) or z_i (modified, Craig)."""
 
     STANDARD = "standard"
     MODIFIED = "modified"
 
 
-def convention_of(name: str) -> Convention:
+def convention_of(name: str) -> DHConvention:
     """Return the convention of this name; raise InputError for an unknown name."""
     try:
-        return Convention(name)
+        return DHConvention(name)
     except (ValueError, TypeError):
         raise InputError(
             "unknown convention",
             found=repr(name),
             remedy="write convention = 'standard' or 'modified'",
-            question=Question.WHICH_DH_CONVENTION,
+            question=QuestionsSection.WHICH_DH_CONVENTION,
         ) from None
 
 
@@ -339,7 +339,7 @@ class DHTable(Displayable):
     tool: the identity
     """
 
-    convention: Convention
+    convention: DHConvention
     rows: tuple[DHRow, ...]
     base: FloatArray = field(default_factory=lambda: np.eye(4))
     tool: FloatArray = field(default_factory=lambda: np.eye(4))
@@ -540,11 +540,11 @@ class DHTable(Displayable):
         joint is a rotation by theta. The motion of a prismatic joint is a translation by d. The constant pose
         of a row is the product of the transforms of all cells except the variable.
         """
-        steps: list[FloatArray | Motion] = [self.base]
+        steps: list[FloatArray | ElementaryMotion] = [self.base]
         for row in self.rows:
-            motion = Motion(2, row.kind.turns)
+            motion = ElementaryMotion(2, row.kind.turns)
             own = along_axis(0.0, row.d) if row.kind.turns else along_axis(row.theta, 0.0)
-            standard = self.convention is Convention.STANDARD
+            standard = self.convention is DHConvention.STANDARD
             steps += [motion, own @ row.X] if standard else [row.X @ own, motion]
         return Path(tuple(steps))
 

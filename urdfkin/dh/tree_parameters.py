@@ -25,9 +25,9 @@ import numpy as np
 
 from urdfkin.compiled.plan import turned
 from urdfkin.dh.common_normals import (
+    AxisTransform,
     NearParallel,
-    Noise,
-    Step,
+    PoseTolerance,
     cleaned_angle,
     cleaned_length,
     demand_squares,
@@ -40,7 +40,7 @@ from urdfkin.dh.export.text import added
 from urdfkin.dh.table import along_axis, between_axes
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
-from urdfkin.errors.display import Code, Table, TextDocument
+from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
 from urdfkin.kinematics.roundings import EPS, of_rows
 from urdfkin.model.path import elementary
@@ -203,7 +203,7 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
 
 
 @dataclass(frozen=True, slots=True)
-class _Link:
+class _LinkAxis:
     """The axis frame of a link.
 
     Attributes:
@@ -218,13 +218,13 @@ class _Link:
     antecedent: int
     T_antecedent_axis: FloatArray
     T_link_axis: FloatArray
-    noise: Noise
+    noise: PoseTolerance
     left_out: float
 
 
-def _links(tree: KinematicTree) -> list[_Link]:
+def _links(tree: KinematicTree) -> list[_LinkAxis]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
-    links = list[_Link]()
+    links = list[_LinkAxis]()
     # Each link has a tuple of three entries.
     # The first entry is the index of the nearest moving link towards the root, or -1 for the root.
     # The second entry is the pose of the link in the axis frame of this moving link.
@@ -237,12 +237,14 @@ def _links(tree: KinematicTree) -> list[_Link]:
         noise, tilt = noise_of(folded + 1, 0.0, way), tilt_of(here)
         left_out = links[antecedent].left_out if antecedent >= 0 else 0.0
         left_out += tilt if tilt <= noise.radians else 0.0
-        links.append(_Link(antecedent, here, align, noise, left_out))
+        links.append(_LinkAxis(antecedent, here, align, noise, left_out))
         carriers.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, here, folded + 1))
     return links
 
 
-def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[int, tuple[float, float]]]:
+def _steps(
+    tree: KinematicTree, links: list[_LinkAxis]
+) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
     The transform leads from the axis of the antecedent (the nearest moving link towards the root) to the
@@ -251,7 +253,7 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
     that theta = 0.
     """
     ways = _path_lengths(tree)
-    steps, own = list[Step](), {-1: (0.0, 0.0)}
+    steps, own = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, way in zip(links, tree.joints, ways, strict=True):
         i = link.antecedent
         moving = joint.kind.has_axis
@@ -272,7 +274,13 @@ def _steps(tree: KinematicTree, links: list[_Link]) -> tuple[list[Step], dict[in
 
 
 def _row(
-    tree: KinematicTree, j: int, i: int, step: Step, own: dict[int, tuple[float, float]], *, way: float
+    tree: KinematicTree,
+    j: int,
+    i: int,
+    step: AxisTransform,
+    own: dict[int, tuple[float, float]],
+    *,
+    way: float,
 ) -> TreeRow:
     joint = tree.joints[j]
     turn, shift = own.get(i, (0.0, 0.0))
@@ -321,7 +329,9 @@ def as_mapping(table: TreeParameters) -> dict[str, Any]:
 def document(table: TreeParameters, units: Units) -> TextDocument:
     rows = [_cells(table, j, units) for j in range(len(table.rows))]
     title = f"{table.robot}: Khalil-Kleinfinger parameters, {table.root} is frame 0"
-    return TextDocument(title, [Code(FORMULA), "", Table(_headings(table, units), rows, (1,), names=(1,))])
+    return TextDocument(
+        title, [CodeLine(FORMULA), "", Table(_headings(table, units), rows, (1,), names=(1,))]
+    )
 
 
 def as_csv(table: TreeParameters) -> str:

@@ -2,8 +2,8 @@
 
 Every message has four parts: the problem, the place, the value found and the remedy. The same four parts are
 attributes of the exception, so a program does not have to parse the message. A message may end with a
-`Question`: the command that prints a section of docs/questions.md. The function `nearest` suggests existing
-names for a misspelt name.
+`QuestionsSection`: the command that prints a section of docs/questions.md. The function `nearest` suggests
+existing names for a misspelt name.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
     return [name for _, name in heapq.nlargest(_OFFERED, found)]
 
 
-class Question(Enum):
+class QuestionsSection(Enum):
     """A section of docs/questions.md, by the anchor of its heading.
 
     If you print a question, you see the command that prints its section:
@@ -133,7 +133,7 @@ class UrdfkinError(Exception):
         where: str | None = None,
         found: str | None = None,
         remedy: str | None = None,
-        question: Question | None = None,
+        question: QuestionsSection | None = None,
     ) -> None:
         super().__init__(what)
         self.what = what
@@ -207,7 +207,7 @@ class UnknownNameError(UrdfkinError, LookupError):
         known: Iterable[str],
         *,
         where: str | None = None,
-        question: Question | None = None,
+        question: QuestionsSection | None = None,
     ) -> None:
         names = sorted(set(known))
         close = nearest(name, names, cutoff=0.5)

@@ -145,7 +145,7 @@ class Strong(str):
         return sentence
 
 
-class Code(str):
+class CodeLine(str):
     """A line that is printed as code, for example a formula."""
 
     __slots__ = ()
@@ -171,7 +171,7 @@ class TextDocument:
 
     def markdown(self) -> str:
         def sentence(words: str) -> str:
-            return markdown_code(words) if isinstance(words, Code) else markdown_text(words)
+            return markdown_code(words) if isinstance(words, CodeLine) else markdown_text(words)
 
         return self._joined("markdown", "\n\n", sentence, lambda title: f"**{markdown_text(title)}**")
 

@@ -74,7 +74,7 @@ _STEP = re.compile(rf"\s*([*/]?)\s*({_FACTOR})")
 _LONGEST_QUANTITY = 200
 
 
-class Measured(NamedTuple):
+class ParsedNumber(NamedTuple):
     """A number in radians or metres if its text has a unit.
 
     Attributes:
@@ -87,7 +87,7 @@ class Measured(NamedTuple):
     per: int
 
 
-def parse_quantity(text: str) -> Measured | None:
+def parse_quantity(text: str) -> ParsedNumber | None:
     """Parse a finite number with an optional unit; return None for other texts, and for sums.
 
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
@@ -111,7 +111,7 @@ Measured(value=0.3, unit=None, per=0), None, None]
     value = -value if found["sign"] == "-" else value
     value = in_radians(value) if unit == "deg" else value / 1000.0 if unit == "mm" else value
     per = re.sub(r"[\s^]", "", found["per"] or "")
-    return Measured(
+    return ParsedNumber(
         value, {"deg": "rad", "mm": "m"}.get(unit or "", unit), 2 if len(per) > 2 else len(per) // 2
     )
 

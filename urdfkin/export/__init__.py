@@ -9,7 +9,7 @@ from urdfkin.errors import UnknownNameError
 from urdfkin.export.seal import seal
 
 if TYPE_CHECKING:
-    from urdfkin.export.code import Code
+    from urdfkin.export.code import FrameCode
 
 #: Each language has a module, a suffix of files, and a summary in one line.
 LANGUAGES: dict[str, tuple[str, str, str]] = {
@@ -33,7 +33,7 @@ FORMS = {"tree": "the URDF's links", "dh": "its Denavit-Hartenberg table", "scre
 QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
-def code_in(code: Code, to: str) -> Code:
+def code_in(code: FrameCode, to: str) -> FrameCode:
     """Return the code for the language `to`: with exact constants for sympy-exact, otherwise unchanged.
 
     Raise VerificationError if Pinocchio computes another result than the exact expressions.
@@ -41,7 +41,7 @@ def code_in(code: Code, to: str) -> Code:
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 
-def write(code: Code, to: str) -> str:
+def write(code: FrameCode, to: str) -> str:
     """Return the text of a file in the language `to`, with its seal, or raise the error of `code_in`."""
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from urdfkin.export.code import Code, Writer
+from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
@@ -22,12 +22,12 @@ _FAST = "-O3 -march=native -ffp-contract=fast -fno-math-errno"
 _PLACE = re.compile(r"@(\w+)@")
 
 
-def write(code: Code, to: str = "c") -> str:
+def write(code: FrameCode, to: str = "c") -> str:
     """Return the text of a C file, which only declares its functions if `NAME_DECLARATIONS` is defined."""
     return unit(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 
-def unit(code: Code, head: str = "", main: str = "") -> str:
+def unit(code: FrameCode, head: str = "", main: str = "") -> str:
     """Return the text of the C file: a header comment, the functions, and a program that checks them."""
     return framed(
         "file.c",
@@ -55,7 +55,7 @@ def comment(lines: Sequence[str]) -> str:
     return "/* " + "\n".join(f" * {line}".rstrip() for line in lines)[3:] + "\n */"
 
 
-def _head(code: Code) -> list[str]:
+def _head(code: FrameCode) -> list[str]:
     name, up = code.name, code.name.upper()
     return [
         *code.head,
@@ -84,7 +84,7 @@ def parameters(function: Function, real: str) -> str:
     return ", ".join([*(f"const {real} *{letter}" for letter in function.inputs), f"{real} *out"])
 
 
-def _declarations(code: Code) -> Iterator[str]:
+def _declarations(code: FrameCode) -> Iterator[str]:
     yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
     for function in code.functions:
         given = parameters(function, f"{code.name.upper()}_REAL")
@@ -96,8 +96,8 @@ def _declarations(code: Code) -> Iterator[str]:
 # -- a function --------------------------------------------------------------------------------------------
 
 
-def _function(code: Code, function: Function) -> str:
-    writer, layout = Writer(code, function, literal, sine=False), Layout(function)
+def _function(code: FrameCode, function: Function) -> str:
+    writer, layout = Writer(code, function, literal, sine=False), InputLayout(function)
     count, widths = len(function.results), code.widths(function)
     return framed(
         "function.c",
@@ -128,18 +128,18 @@ def _function(code: Code, function: Function) -> str:
     )
 
 
-def spare(code: Code, function: Function) -> int:
+def spare(code: FrameCode, function: Function) -> int:
     """Return the smallest number of configurations for which every array has at least eight numbers."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
 
-def advance(code: Code, function: Function) -> str:
+def advance(code: FrameCode, function: Function) -> str:
     """Return C code that moves each pointer by `LANES` configurations, which are computed together."""
     return ", ".join(f"{x} += LANES * {width}" for x, width in code.widths(function).items())
 
 
-class Layout:
+class InputLayout:
     """The order in which the array `in` contains a function's inputs, angles, sines and cosines.
 
     All angles are adjacent: first the angles that are inputs, then the angles that are computed.
@@ -163,7 +163,7 @@ class Layout:
         return self.inputs.index(node)
 
 
-def _lines(writer: Writer, layout: Layout) -> Iterator[str]:
+def _lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     for node in writer.given:
         yield f"const real {writer.words[node]} = in[{layout.place(node)} * L];"
     for head, lines in writer.statements():
@@ -172,7 +172,7 @@ def _lines(writer: Writer, layout: Layout) -> Iterator[str]:
     yield from (f"out[{k} * L] = {value};" for k, value in enumerate(writer.results()))
 
 
-def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
+def _sines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     count = len(layout.angles)
     yield from (f"{angle};" for angle in _computed_angles(writer, layout, "in[{}]"))
     for k in range(layout.first, layout.first + count):
@@ -180,13 +180,13 @@ def _sines(writer: Writer, layout: Layout) -> Iterator[str]:
         yield f"in[{k + 2 * count}] = cos(in[{k}]);"
 
 
-def _computed_angles(writer: Writer, layout: Layout, at: str) -> Iterator[str]:
+def _computed_angles(writer: Writer, layout: InputLayout, at: str) -> Iterator[str]:
     for node in layout.made:
         value = writer.whole(node, lambda x: at.format(layout.place(x)))
         yield f"{at.format(layout.place(node))} = {value}"
 
 
-def _reads(layout: Layout, widths: dict[str, int]) -> Iterator[str]:
+def _reads(layout: InputLayout, widths: dict[str, int]) -> Iterator[str]:
     for x, width in widths.items():
         for first in range(0, width, 8):
             found = [node for node in layout.inputs if node.op == x and node.of[0] // 8 == first // 8]
@@ -200,7 +200,7 @@ def _reads(layout: Layout, widths: dict[str, int]) -> Iterator[str]:
     yield "(void)in;"
 
 
-def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
+def _lane_sines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     if count := len(layout.angles):
         for made in _computed_angles(writer, layout, "in[{} * LANES + k]"):
             yield f"for (int k = 0; k < LANES; ++k) {made};"
@@ -211,7 +211,7 @@ def _lane_sines(writer: Writer, layout: Layout) -> Iterator[str]:
 # -- the test vectors of a function ------------------------------------------------------------------------
 
 
-def vectors(code: Code) -> Iterator[str]:
+def vectors(code: FrameCode) -> Iterator[str]:
     """Yield C arrays with the test vectors: their inputs, the true values and the tolerances."""
     found, n = code.proof.vectors, len(code.proof.vectors)
     yield "/* True values at fifty digits; the tolerances in double and single precision, in eps. */"
@@ -242,13 +242,13 @@ def _numbers(values: Sequence[str]) -> str:
     return "\n".join([*lines, line.rstrip(",")])
 
 
-def main(code: Code, *frames: str) -> str:
+def main(code: FrameCode, *frames: str) -> str:
     """Return a program that runs the test vectors with the templates `frames`, for example "check_one.c"."""
     checks = (_check(code, function, frame) for function in code.functions for frame in frames)
     return framed("check.c", checks="".join(checks))
 
 
-def _check(code: Code, function: Function, frame: str) -> str:
+def _check(code: FrameCode, function: Function, frame: str) -> str:
     widths, n = code.widths(function), len(code.proof.vectors)
     return framed(
         frame,

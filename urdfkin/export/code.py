@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
-from urdfkin.compiled.plan import CompiledTree, Step
+from urdfkin.compiled.plan import CompiledTree, StepField
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_names, as_str
 from urdfkin.export import recursion
@@ -27,7 +27,7 @@ _LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
 
 @dataclass(frozen=True)
-class Code:
+class FrameCode:
     """The functions of a frame. No name contains characters that end a comment in the exported file.
 
     Attributes:
@@ -56,7 +56,7 @@ class Code:
     words: dict[str, list[str]]
     about: tuple[str, ...] = ()
     vouched: Proof | None = None
-    exact: Callable[[], Code] | None = None
+    exact: Callable[[], FrameCode] | None = None
 
     @property
     def proof(self) -> Proof:
@@ -106,7 +106,7 @@ def code_of(
     name: str | None,
     verify: bool | None,
     about: str = "",
-) -> Code:
+) -> FrameCode:
     """Return the code of a frame with test vectors and with the result of the comparison with Pinocchio.
 
     `plan_of` returns the compiled tree of the joints that move the given links. By default, the prefix `name`
@@ -132,7 +132,7 @@ def code_of(
     proof = prove(verifier, plan_of, frame, reference, code.functions, verify)
     code = replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
 
-    def exact() -> Code:
+    def exact() -> FrameCode:
         from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only one language needs this
 
         functions, vouched = exact_functions(
@@ -150,10 +150,10 @@ def bare(
     rows: Sequence[Quantity],
     reference: Reference,
     name: str,
-) -> Code:
+) -> FrameCode:
     coordinates, rates = coordinate_names(tree), rate_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
-    return Code(
+    return FrameCode(
         name=name,
         robot=shown(tree.name),
         frame=shown(frame),
@@ -193,7 +193,12 @@ class Writer:
     """
 
     def __init__(
-        self, code: Code, function: Function, literal: Callable[[float], str] = repr, *, sine: bool = True
+        self,
+        code: FrameCode,
+        function: Function,
+        literal: Callable[[float], str] = repr,
+        *,
+        sine: bool = True,
     ) -> None:
         self.code, self.function, self.literal = code, function, literal
         self.own = set(function.statements)
@@ -229,7 +234,7 @@ class Writer:
         if place < 0:
             return "constants"
         if place < len(joints):
-            kind = ("is revolute", "is prismatic", "is planar", "is floating")[steps[place, Step.KIND]]
+            kind = ("is revolute", "is prismatic", "is planar", "is floating")[steps[place, StepField.KIND]]
             return f"{joints[place]} {kind}"
         return self.code.frame if place == len(joints) else "results"
 

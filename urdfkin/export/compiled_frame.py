@@ -29,8 +29,8 @@ from urdfkin.compiled.kept import compiling
 from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, lines
 from urdfkin.compiled.prepared import Fast
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.export.c import Layout, advance, framed, spare, unit
-from urdfkin.export.code import Code, bare
+from urdfkin.export.c import InputLayout, advance, framed, spare, unit
+from urdfkin.export.code import FrameCode, bare
 from urdfkin.model.configuration import draw, warn_of_degrees
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
@@ -52,7 +52,7 @@ class NoCompilerError(Exception):
     """There is no C compiler, or the compiler rejects the code; the message is the compiler's."""
 
 
-def library(code: Code) -> ctypes.CDLL:
+def library(code: FrameCode) -> ctypes.CDLL:
     """Compile code that consists of one function, and load it as a library, or raise NoCompilerError.
 
     The library's entry point `task` takes an array with the fields of `KernelArgs`. It returns 0, or 1 if an
@@ -71,9 +71,9 @@ def library(code: Code) -> ctypes.CDLL:
     return _load(data)
 
 
-def _entrance(code: Code) -> str:
+def _entrance(code: FrameCode) -> str:
     (function,) = code.functions
-    widths, layout = code.widths(function), Layout(function)
+    widths, layout = code.widths(function), InputLayout(function)
     spread = (
         f"    for (int k = 0; k < LANES; ++k) in[{at} * LANES + k] = {x.op}[{x.of[0]}];"
         for at, x in enumerate(layout.inputs)
@@ -182,7 +182,7 @@ def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
     )
 
 
-class _Robot(Protocol):
+class _ExportedRobot(Protocol):
     verifier: Verifier
 
     @property
@@ -213,7 +213,7 @@ class CompiledFrame:
     (1000, 6, 6)
     """
 
-    def __init__(self, robot: _Robot, frame: str, reference: Reference) -> None:
+    def __init__(self, robot: _ExportedRobot, frame: str, reference: Reference) -> None:
         self.frame, self.reference = frame, reference
         self._robot, self._tree = robot, robot.verifier.tree
         self._plan = robot.plan([self._tree.frame_link(frame)])

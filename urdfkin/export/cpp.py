@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from urdfkin.export.c import comment, framed, main, parameters, vectors, what
-from urdfkin.export.code import Code, Writer
+from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.function import Function
 
 
-def write(code: Code, to: str = "cpp") -> str:
+def write(code: FrameCode, to: str = "cpp") -> str:
     """Return the text of a header. If `NAME_MAIN` is defined, it is a program that checks itself."""
     return _cuda(code) if to == "cuda" else _cpp(code)
 
 
-def _cpp(code: Code) -> str:
+def _cpp(code: FrameCode) -> str:
     name, up = code.name, code.name.upper()
     first = code.functions[0]
     head = [
@@ -42,7 +42,7 @@ def _cpp(code: Code) -> str:
     )
 
 
-def _cuda(code: Code) -> str:
+def _cuda(code: FrameCode) -> str:
     name, up = code.name, code.name.upper()
     first = code.functions[0]
     inputs = ", ".join(first.inputs)
@@ -81,7 +81,7 @@ def _cuda(code: Code) -> str:
     )
 
 
-def _entries(code: Code, function: Function) -> list[str]:
+def _entries(code: FrameCode, function: Function) -> list[str]:
     name = f"{code.name}_{function.name}"
     return [
         f"int {name}_{real}(size_t n, {parameters(function, real)}, struct CUstream_st *stream)"
@@ -89,12 +89,12 @@ def _entries(code: Code, function: Function) -> list[str]:
     ]
 
 
-def _started(code: Code, function: Function) -> str:
+def _started(code: FrameCode, function: Function) -> str:
     call = f"{code.name}_kinematics::{function.name}_batch(n, {', '.join(function.inputs)}, out, stream)"
     return "\n".join(f"{line}\n{{\n    return {call};\n}}" for line in _entries(code, function))
 
 
-def _kernel(code: Code, function: Function) -> str:
+def _kernel(code: FrameCode, function: Function) -> str:
     widths = code.widths(function)
     return framed(
         "kernel.cuh",
@@ -111,7 +111,7 @@ def _kernel(code: Code, function: Function) -> str:
     )
 
 
-def _function(code: Code, function: Function, before: str = "") -> Iterator[str]:
+def _function(code: FrameCode, function: Function, before: str = "") -> Iterator[str]:
     writer = Writer(code, function, lambda x: f"T({x!r})")
     yield f"\n/* {what(function)}, row by row; {function.operations} operations. */"
     yield f"template <class T> {before}void {function.name}({parameters(function, 'T')})\n{{"

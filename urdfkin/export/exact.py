@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled.plan import Column, CompiledTree, Geometry
+from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry
 from urdfkin.dh.units import fraction_text, pi_fraction
 from urdfkin.export.expression import Graph, Node, Number
 from urdfkin.export.function import INPUTS, Function, function_of
@@ -23,7 +23,7 @@ from urdfkin.export.proof import Proof, compared
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
-from urdfkin.verify.exact.numbers import DIGITS, Kind, enough_digits, exact, precision, read_exact
+from urdfkin.verify.exact.numbers import DIGITS, NumberType, enough_digits, exact, precision, read_exact
 from urdfkin.verify.verifier import Verifier
 
 #: Largest angle (rad) that is replaced by a multiple of pi.
@@ -99,7 +99,7 @@ def exact_plan(
     """
     graph.place = -1
     eq, path = graph.chapter, tree.path(link)
-    joints = read_exact(text, tree, path, Kind(Fraction, graph.sine_cosine, graph.root))
+    joints = read_exact(text, tree, path, NumberType(Fraction, graph.sine_cosine, graph.root))
     R, p, rows = IDENTITY, ZERO, list[tuple[Number, ...]]()
     for i in path:
         joint, own = tree.joints[i], joints[i]
@@ -111,7 +111,7 @@ def exact_plan(
             R, p = eq.transposed(A), ZERO
     geometry = np.array(rows, dtype=object).reshape(-1, len(plan.geometry.T))
     offsets = np.array([(*(x for row in R for x in row), *p)], dtype=object)
-    multipliers = geometry[plan.columns[:, Column.STEP], Geometry.MULTIPLIER]
+    multipliers = geometry[plan.columns[:, ColumnField.STEP], Geometry.MULTIPLIER]
     return replace(plan, geometry=geometry, offsets=offsets, multipliers=multipliers)
 
 

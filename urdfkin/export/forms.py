@@ -19,7 +19,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import UnknownNameError
 from urdfkin.export import FORMS, QUANTITIES
-from urdfkin.export.code import Code, code_of
+from urdfkin.export.code import FrameCode, code_of
 from urdfkin.export.naming import all_safe, safe
 from urdfkin.model.reference import Reference
 from urdfkin.system.lazy_import import hook
@@ -35,7 +35,7 @@ def code_of_robot(
     *,
     name: str | None = None,
     verify: bool | None = None,
-) -> Code:
+) -> FrameCode:
     """Return the exported code of a robot's frame; the arguments and errors are those of `Robot.export`."""
     if form not in FORMS:
         raise UnknownNameError("form", form, FORMS)
@@ -54,7 +54,7 @@ def code_of_chain(
     *,
     name: str | None = None,
     verify: bool = True,
-) -> Code:
+) -> FrameCode:
     """Return the exported code of a chain's last frame, with test vectors and the comparison with Pinocchio.
 
     The code has one step for each row of the table, or for each screw. Results are in the axes of the chain's

@@ -151,7 +151,7 @@ def function_of(
     def entering(place: int) -> None:
         graph.place = place
 
-    kind = recursion.Kind(graph.chapter, graph.sine_cosine, graph.root, entering, _name)
+    kind = recursion.NumberKind(graph.chapter, graph.sine_cosine, graph.root, entering, _name)
     inputs = [
         [graph.input(letter, i) for i in range(plan.nq if letter == "q" else plan.nv)]
         if letter in quantity.inputs

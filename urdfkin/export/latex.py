@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from urdfkin.errors.escape import latex_text
-from urdfkin.export.code import Code, Writer
+from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
@@ -37,7 +37,7 @@ _RESULTS = {
 }
 
 
-def write(code: Code, to: str = "latex") -> str:
+def write(code: FrameCode, to: str = "latex") -> str:
     lines = [f"% {line}".rstrip() for line in code.head]
     lines += [
         r"\documentclass{article}",
@@ -58,7 +58,7 @@ def write(code: Code, to: str = "latex") -> str:
     return "\n".join([*lines, r"\end{document}", ""])
 
 
-def _function(code: Code, function: Function) -> Iterator[str]:
+def _function(code: FrameCode, function: Function) -> Iterator[str]:
     writer = Writer(code, function, _literal)
     writer.words = {node: _symbol(node, word) for node, word in writer.words.items()}
     yield rf"\subsection*{{{function.quantity.title}, eq. {', '.join(function.quantity.equations)}}}"

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urdfkin.export.code import Code, Writer
+from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.function import Function
 
 _CHECK = """
@@ -30,7 +30,7 @@ end
 """
 
 
-def write(code: Code, to: str = "matlab") -> str:
+def write(code: FrameCode, to: str = "matlab") -> str:
     name = f"{code.name}_kinematics"
     head = [
         *code.head,
@@ -45,7 +45,7 @@ def write(code: Code, to: str = "matlab") -> str:
     return "\n".join(lines) + "\n" + _check(code)
 
 
-def _function(code: Code, function: Function) -> Iterator[str]:
+def _function(code: FrameCode, function: Function) -> Iterator[str]:
     writer = Writer(code, function)
     shape = function.shape if len(function.shape) > 1 else (*function.shape, 1)
     yield f"function out = {function.name}({', '.join(function.inputs)})"
@@ -64,7 +64,7 @@ def _function(code: Code, function: Function) -> Iterator[str]:
     yield "end"
 
 
-def _check(code: Code) -> str:
+def _check(code: FrameCode) -> str:
     found = code.proof.vectors
     most = max((function.inputs for function in code.functions), key=len)
     given = [

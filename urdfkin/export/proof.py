@@ -26,7 +26,7 @@ from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.lazy_import import own_version
-from urdfkin.verify.bounds import Conversion, against_true_values
+from urdfkin.verify.bounds import DecimalErrors, against_true_values
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.exact.numbers import (
@@ -210,7 +210,7 @@ def _single(x: FloatArray) -> FloatArray:
     return x.astype(np.float32).astype(np.float64)
 
 
-def _within(function: Function, part: Part, errors: Conversion) -> tuple[FloatArray, FloatArray]:
+def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
     """Return the error bounds k * scale of a function's results, in eps, and the scales.
 
     Both arrays have the shape (n, numbers).

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled.plan import CompiledTree, Motion, Step
+from urdfkin.compiled.plan import CompiledTree, JointMotion, StepField
 from urdfkin.errors import InputError
-from urdfkin.export.code import Code, Writer
+from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function
 from urdfkin.verify.bounds import column_weights
@@ -53,7 +53,7 @@ class Dialect:
     index: str = "{}[{}]"
     given: str = ""
     single: bool = False
-    closing: Callable[[Code], str] = lambda code: ""
+    closing: Callable[[FrameCode], str] = lambda code: ""
     after: str = ""
     exact: bool = False
 
@@ -241,7 +241,7 @@ def gradients(device="cpu"):
 '''
 
 
-def _torch_module(code: Code) -> str:
+def _torch_module(code: FrameCode) -> str:
     """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
     # The method `forward` computes the function with the fewest inputs, usually a function of q.
     first = min(code.functions, key=lambda function: len(function.inputs))
@@ -264,11 +264,11 @@ def _rate(plan: CompiledTree) -> float:
     derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a product of
     F rotated vectors, the third derivative is at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
     """
-    floats = bool((plan.steps[:, Step.KIND] == Motion.FLOATING).any())
+    floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))
 
 
-def _all(code: Code) -> str:
+def _all(code: FrameCode) -> str:
     """Return the names of all functions as the elements of a tuple."""
     return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
 
@@ -407,7 +407,7 @@ DIALECTS = {
 }
 
 
-def write(code: Code, to: str) -> str:
+def write(code: FrameCode, to: str) -> str:
     """Return the text of a Python module with a function for each quantity, and a check (`python FILE`)."""
     dialect = DIALECTS[to]
     about = dialect.about.format(nq=code.nq, nv=code.nv)
@@ -426,7 +426,7 @@ def write(code: Code, to: str) -> str:
     return "\n".join([*lines, *_check(code, dialect), ""])
 
 
-def _imports(code: Code, dialect: Dialect) -> str:
+def _imports(code: FrameCode, dialect: Dialect) -> str:
     nodes = [node.op for function in code.functions for node in function.nodes]
     used = ", ".join(name for name in _FUNCTIONS if name in nodes)
     lines = [line for line in dialect.imports.split("\n") if used or "{}" not in line]
@@ -439,7 +439,7 @@ def _exact(x: Number) -> str:
     return literal(x)
 
 
-def _function(code: Code, function: Function, dialect: Dialect) -> Iterator[str]:
+def _function(code: FrameCode, function: Function, dialect: Dialect) -> Iterator[str]:
     writer = Writer(code, function, _exact if dialect.exact else repr)
     if dialect.decorator:
         yield dialect.decorator
@@ -495,7 +495,7 @@ _DOUBLE = '[("float64", 2.0**-52, WITHIN)]'
 _BOTH = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
 
 
-def _check(code: Code, dialect: Dialect) -> Iterator[str]:
+def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
     yield "\n# Configurations, true values at fifty digits, and tolerances in eps = 2^-52."
     if dialect.single:
         yield "# SINGLE: tolerances in single precision, in eps = 2^-23."

@@ -16,8 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, assert_never
 
-from urdfkin.compiled.plan import Column as ColumnField
-from urdfkin.compiled.plan import CompiledTree, Geometry, Motion
+from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry, JointMotion
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.recursion import Column, Matrix, Number, Recursion, State, Vector
 from urdfkin.model.reference import Reference
@@ -26,7 +25,7 @@ _Z: Vector = (0, 0, 1)
 
 
 @dataclass(frozen=True)
-class Kind:
+class NumberKind:
     """A kind of number.
 
     Attributes:
@@ -58,7 +57,7 @@ class TreeRecursion(Recursion):
     """
 
     def __init__(
-        self, plan: CompiledTree, kind: Kind, inputs: Sequence[Sequence[Number]], *, own: bool
+        self, plan: CompiledTree, kind: NumberKind, inputs: Sequence[Sequence[Number]], *, own: bool
     ) -> None:
         super().__init__(kind.chapter, own)
         self.plan, self.kind, self.inputs = plan, kind, inputs
@@ -91,18 +90,18 @@ class TreeRecursion(Recursion):
 
     def _move(self, i: int, s: State) -> State:
         (kind, at, rate_at), (q, v, a) = self.plan.steps[i].tolist(), self.inputs
-        match motion := Motion(kind):
-            case Motion.PLANAR:
+        match motion := JointMotion(kind):
+            case JointMotion.PLANAR:
                 return self.planar(s, q[at:], self._about_z(q[at + 2]), v[rate_at:], a[rate_at:])
-            case Motion.FLOATING:
+            case JointMotion.FLOATING:
                 quaternion = q[at + 3 : at + 7]
                 length = self.kind.root(sum(c * c for c in quaternion))
                 S = self.eq.rotation_of_quaternion(*(c / length for c in quaternion))
                 return self.floating(s, q[at:], S, v[rate_at:], a[rate_at:])
-            case Motion.TURN:
+            case JointMotion.TURN:
                 value, *rates = self._own_values(i)
                 return self.revolute(s, _Z, self._about_z(value), *rates)
-            case Motion.SLIDE:
+            case JointMotion.SLIDE:
                 return self.prismatic(s, _Z, *self._own_values(i))
             case _:
                 assert_never(motion)
@@ -141,38 +140,38 @@ def _without_rounding(x: Sequence[float]) -> Vector:
 # -- the quantities of the frame ----------------------------------------------------------------------------
 
 
-def placement(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+def placement(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the numbers of the placement T_world_frame, row by row."""
     end = TreeRecursion(plan, kind, inputs, own=False).end
     rows = [[*row, x] for row, x in zip(end.R, end.p, strict=True)]
     return [*(x for row in rows for x in row), 0.0, 0.0, 0.0, 1.0]
 
 
-def velocity(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+def velocity(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the velocity [linear; angular] of the frame (7.127, 7.128)."""
     path = _recursion(plan, kind, inputs, reference)
     return _six_vector(path, reference, *path.velocity(path.end, reference))
 
 
-def acceleration(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+def acceleration(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the classical acceleration [linear; angular] of the frame (7.129, 7.130)."""
     path = _recursion(plan, kind, inputs, reference)
     return _six_vector(path, reference, *path.acceleration(path.end, reference))
 
 
-def jacobian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+def jacobian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the numbers of the frame's Jacobian (7.85), row by row."""
     path = TreeRecursion(plan, kind, inputs, own=False)
     return _by_row(path.jacobian(path.end, path.columns, plan.nv, reference))
 
 
-def jacobian_rate(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the numbers of the Jacobian's time derivative (7.126), row by row."""
     path = TreeRecursion(plan, kind, inputs, own=False)
     return _by_row(path.jacobian_rate(path.end, path.columns, plan.nv, reference))
 
 
-def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> list[Number]:
+def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
     """Return the derivative of each Jacobian entry with respect to each coordinate (the terms of 7.126)."""
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
@@ -182,7 +181,7 @@ def hessian(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -
     return out
 
 
-def _recursion(plan: CompiledTree, kind: Kind, inputs: Any, reference: Reference) -> TreeRecursion:
+def _recursion(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> TreeRecursion:
     # The reference WORLD needs the position p, which is computed in world axes.
     return TreeRecursion(plan, kind, inputs, own=not reference.at_world)
 
@@ -204,7 +203,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
 
 
 #: Each quantity has a function that computes it.
-QUANTITIES: dict[str, Callable[[CompiledTree, Kind, Any, Reference], list[Number]]] = {
+QUANTITIES: dict[str, Callable[[CompiledTree, NumberKind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,
     "jacobian": jacobian,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.errors import InputError, Question
+from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.kinematics.rotation import nearest_rotation
 from urdfkin.model.tree import FloatArray, frozen
 
@@ -48,7 +48,7 @@ class BaseMotion:
                 raise InputError(
                     f"the base's {name} must be a finite array (..., {', '.join(map(str, shape))})",
                     found=f"shape {array.shape}" if array.shape[-len(shape) :] != shape else "nan or inf",
-                    question=None if name == "placement" else Question.ROW_ORDER,
+                    question=None if name == "placement" else QuestionsSection.ROW_ORDER,
                 )
             object.__setattr__(self, name, array)
         try:

@@ -20,7 +20,7 @@ from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.rotation import axis_aligning
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
-from urdfkin.model.path import Motion, Path
+from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -166,7 +166,7 @@ class FrameChain(Displayable):
         >>> path.path.poses(np.zeros(2))[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
-        moving = ((joint.T_previous_joint, Motion(2, joint.kind.turns)) for joint in self.joints)
+        moving = ((joint.T_previous_joint, ElementaryMotion(2, joint.kind.turns)) for joint in self.joints)
         return Path((*(step for pair in moving for step in pair), self.T_last_tip))
 
     @cached_property

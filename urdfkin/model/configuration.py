@@ -21,7 +21,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, Question, warn_caller
+from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, QuestionsSection, warn_caller
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, unit_quaternions
 from urdfkin.kinematics.roundings import EPS, FOLLOWER
@@ -249,12 +249,12 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
     return {
         joint.name: Hint(
             f"it mimics {joint.mimic.leader}: give that value, or load with mimic=False (--no-mimic)",
-            Question.MIMIC_JOINTS,
+            QuestionsSection.MIMIC_JOINTS,
         )
         if joint.mimic
-        else Hint("leave out this fixed joint", Question.FIXED_JOINTS)
+        else Hint("leave out this fixed joint", QuestionsSection.FIXED_JOINTS)
         if joint.lock is None
-        else Hint(f"leave out this joint, locked at {joint.lock.value:.6g}", Question.LOCKED_JOINTS)
+        else Hint(f"leave out this joint, locked at {joint.lock.value:.6g}", QuestionsSection.LOCKED_JOINTS)
         for joint in tree.joints
         if not joint.nv
     }
@@ -265,7 +265,7 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
     follow = any(joint.mimic for joint in tree.joints)
     free = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
-        Question.MIMIC_JOINTS,
+        QuestionsSection.MIMIC_JOINTS,
     )
     of_followers = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
     found: dict[int, Hint] = {}
@@ -275,7 +275,7 @@ def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
             asks = f", mimic={mimic}" if follow else ""
             found[length] = Hint(
                 f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) converts it to urdfkin's",
-                Question.CONTINUOUS_JOINTS,
+                QuestionsSection.CONTINUOUS_JOINTS,
             )
         if follow:
             both = found.get(tree.nq + of_followers)
@@ -347,13 +347,13 @@ def locked_values(
             "a pose does not state which joints to lock",
             where="lock",
             remedy=remedy,
-            question=Question.LOCKED_JOINTS,
+            question=QuestionsSection.LOCKED_JOINTS,
         )
     for name, (at, size) in layout.spans.items():
         if not chosen.isdisjoint([name, *layout.names[at : at + size]]):
             kind = tree.joints[tree.joint_index(name)].kind.value
             remedy = "leave it out" if joints is None else "add it to joints (--joints)"
-            claim, question = f"a {kind} joint has no single value to lock", Question.LOCKED_JOINTS
+            claim, question = f"a {kind} joint has no single value to lock", QuestionsSection.LOCKED_JOINTS
             raise InputError(claim, where=name, remedy=remedy, question=question)
     rest = zip(layout.names, (neutral(tree) if pose is None else pose).tolist(), strict=True)
     q = layout.read({**dict(rest), **values}, "lock")
@@ -431,7 +431,7 @@ def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
             f"{what} needs {width} numbers for {tree.name}: {names}",
             found=f"shape {array.shape}",
             remedy=instead and instead.remedy,
-            question=instead.question if instead else Question.JOINT_ORDER,
+            question=instead.question if instead else QuestionsSection.JOINT_ORDER,
         )
     return array
 
@@ -525,7 +525,7 @@ def warn_of_degrees(tree: KinematicTree, q: FloatArray) -> None:
     if lines := degrees_lines(tree, q):
         more = f" ({len(lines) - 1} more joints likewise)" if len(lines) > 1 else ""
         advice = "q is in radians; numpy.radians converts degrees"
-        warn_caller(f"{tree.name}: {lines[0]}{more}: {advice}; {Question.DEGREES}", DegreesWarning)
+        warn_caller(f"{tree.name}: {lines[0]}{more}: {advice}; {QuestionsSection.DEGREES}", DegreesWarning)
 
 
 def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | None]:
@@ -582,7 +582,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
             remedy=f"use mimic={not mimic} for a model of buildModelFromUrdf(..., mimic={not mimic})"
             if other
             else None,
-            question=Question.MIMIC_JOINTS if other else Question.CONTINUOUS_JOINTS,
+            question=QuestionsSection.MIMIC_JOINTS if other else QuestionsSection.CONTINUOUS_JOINTS,
         )
     own, followers, at = np.zeros((*q.shape[:-1], tree.nq)), [], 0
     for i, joint in enumerate(tree.joints):
@@ -610,7 +610,7 @@ def _angle_back(joint: Joint, values: FloatArray) -> FloatArray:
             "(cos, sin) must have norm 1",
             where=f"joint {joint.name}",
             found=f"{norm.max():.9g}",
-            question=Question.CONTINUOUS_JOINTS,
+            question=QuestionsSection.CONTINUOUS_JOINTS,
         )
     return np.concatenate((values[..., :-2], np.arctan2(sine, cosine)[..., None]), axis=-1)
 
@@ -628,7 +628,7 @@ def _check_mimic_rule(joint: Joint, leader: FloatArray, values: FloatArray) -> N
             where=f"joint {joint.name}",
             found=f"the value is off by {np.abs(off).max():.3g}",
             remedy="load with mimic=False to give it its own coordinate",
-            question=Question.MIMIC_JOINTS,
+            question=QuestionsSection.MIMIC_JOINTS,
         )
 
 

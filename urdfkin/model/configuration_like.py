@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, Question, UnknownNameError
+from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, floats
@@ -42,7 +42,7 @@ class Hint(NamedTuple):
     """The remedy for a wrong input, and the page with the explanation."""
 
     remedy: str
-    question: Question
+    question: QuestionsSection
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +184,7 @@ keeps: 'neutral, elbow=...'
         x = floats(value, f"{where}, {name}")
         if x.shape[-1:] != (size,):
             names, count = self.names[at : at + size], (x.shape or (1,))[-1]
-            raise wrong_count(names, count, f"{where}, {name}", question=Question.FLOATING_BASES)
+            raise wrong_count(names, count, f"{where}, {name}", question=QuestionsSection.FLOATING_BASES)
         return {at + k: x[..., k] for k in range(size)}
 
     def _not_a_coordinate(self, name: object, where: str) -> InputError | UnknownNameError:
@@ -272,7 +272,7 @@ def wrong_count(
     count: int,
     where: str,
     remedy: str | None = None,
-    question: Question = Question.JOINT_ORDER,
+    question: QuestionsSection = QuestionsSection.JOINT_ORDER,
 ) -> InputError:
     without = f", none for {listed(names[count:])}" if count < len(names) else ""
     return InputError(

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from urdfkin.errors import InputError, Question
+from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.model.configuration import numbers
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, frozen
@@ -63,7 +63,7 @@ class Coupling:
         # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
         own = tuple(map(units.get, self.names))
         follow = {
-            joint: Hint(f"it mimics {mimic.leader}: give that value", Question.MIMIC_JOINTS)
+            joint: Hint(f"it mimics {mimic.leader}: give that value", QuestionsSection.MIMIC_JOINTS)
             for joint, mimic, _ in rules
             if mimic
         }

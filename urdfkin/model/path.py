@@ -28,7 +28,7 @@ _IDENTITY = np.eye(4)
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class ElementaryMotion:
     """A rotation about a coordinate axis (0 is x, 1 is y, 2 is z) of the current frame, or a translation."""
 
     axis: int
@@ -46,7 +46,7 @@ class Path:
     [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
     """
 
-    steps: tuple[FloatArray | Motion, ...]
+    steps: tuple[FloatArray | ElementaryMotion, ...]
 
     def frames(self, amounts: ArrayLike) -> FloatArray:
         """Return the poses (..., steps, 4, 4) after each step, for x_k (..., motions) in rad or m."""
@@ -63,7 +63,7 @@ class Path:
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         k = 0
         for step in self.steps:
-            if isinstance(step, Motion):
+            if isinstance(step, ElementaryMotion):
                 if moving[k]:
                     T = _moved(T, step, amounts[..., k])
                 k += 1
@@ -86,7 +86,7 @@ class Path:
     def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the result of `columns`, computed from the result (..., steps, 4, 4) of `frames`."""
         T = frames[..., -1, :, :]
-        motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, Motion)]
+        motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
         # A motion does not move its own axis, so the frame after the motion also contains the axis.
         at = [i for i, _ in motions]
         axes = frames[..., at, :3, [step.axis for _, step in motions]]
@@ -104,10 +104,10 @@ def elementary(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
     """Return the poses (..., 4, 4) of rotations (rad) about, or translations (m) along, a coordinate axis."""
     amount = np.asarray(amount, np.float64)
     T = np.tile(_IDENTITY, (*amount.shape, 1, 1))
-    return _moved(T, Motion(axis, turns), amount) if amount.any() else T
+    return _moved(T, ElementaryMotion(axis, turns), amount) if amount.any() else T
 
 
-def _moved(T: FloatArray, motion: Motion, amount: FloatArray) -> FloatArray:
+def _moved(T: FloatArray, motion: ElementaryMotion, amount: FloatArray) -> FloatArray:
     """Return the poses T (..., 4, 4), multiplied from the right by an elementary motion."""
     moved = np.array(T)
     if motion.turns:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from urdfkin.errors import Question, UnknownNameError
+from urdfkin.errors import QuestionsSection, UnknownNameError
 from urdfkin.errors.validators import safe_repr
 
 
@@ -51,5 +51,5 @@ class Reference(IntEnum):
         name = value if isinstance(value, str) else safe_repr(value)
         if name.upper() not in cls.__members__:
             known = [member.lower() for member in cls.__members__]
-            raise UnknownNameError("reference", name, known, question=Question.REFERENCE_FRAMES)
+            raise UnknownNameError("reference", name, known, question=QuestionsSection.REFERENCE_FRAMES)
         return cls[name.upper()]

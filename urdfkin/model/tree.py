@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Self, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.errors import InputError, Question, UnknownNameError
+from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, floats, rotation_defect
 from urdfkin.kinematics.rotation import coordinate_rotation, rotation_about
@@ -405,7 +405,7 @@ class KinematicTree:
             meant = self._with_prefix(name)
             if meant is None:
                 raise UnknownNameError(
-                    "frame", name, self.frame_names, where=self.name, question=Question.UNKNOWN_FRAMES
+                    "frame", name, self.frame_names, where=self.name, question=QuestionsSection.UNKNOWN_FRAMES
                 )
             return self._frame_index(meant)
         if link is not None and joint is not None and link != joint + 1:

@@ -31,8 +31,16 @@ from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.model.summary import axis_words, rule_words
 from urdfkin.report.markdown import LIMIT, shortened
 from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
-from urdfkin.system.documents import Header, Layout, plain, says
-from urdfkin.validation.document import Check, Document, Joint, Model, Robot, Units, outcome_of
+from urdfkin.system.documents import DocumentKind, Header, plain, says
+from urdfkin.validation.document import (
+    Document,
+    ReportedCheck,
+    ReportedJoint,
+    ReportedModel,
+    ReportedRobot,
+    Units,
+    outcome_of,
+)
 from urdfkin.verify.oracles import versions
 
 #: Longer texts are truncated to this length.
@@ -41,7 +49,7 @@ _LONGEST = 200
 _PRECISION = Tolerance(1e-9, 1e-9)
 
 
-def model_changes(old: Model | None, new: Model | None) -> Iterator[tuple[str, str, str]]:
+def model_changes(old: ReportedModel | None, new: ReportedModel | None) -> Iterator[tuple[str, str, str]]:
     """Yield the name, old value and new value of each change of a model. A missing value is empty."""
     before, after = _joints(old), _joints(new)
     for name in dict.fromkeys([*before, *after]):
@@ -58,11 +66,11 @@ def model_changes(old: Model | None, new: Model | None) -> Iterator[tuple[str, s
                 yield what, shortened(_names(frames[0]), _LONGEST), shortened(_names(frames[1]), _LONGEST)
 
 
-def _joints(model: Model | None) -> dict[str, Joint]:
+def _joints(model: ReportedModel | None) -> dict[str, ReportedJoint]:
     return {joint["name"]: joint for joint in model["joints"]} if model else {}
 
 
-def _joint_changes(was: Joint, now: Joint) -> Iterator[tuple[str, str, str]]:
+def _joint_changes(was: ReportedJoint, now: ReportedJoint) -> Iterator[tuple[str, str, str]]:
     for entry, aspect in (("kind", "kind"), ("parent", "parent link"), ("child", "child link")):
         if dict(was)[entry] != dict(now)[entry]:
             yield aspect, str(dict(was)[entry]), str(dict(now)[entry])
@@ -92,7 +100,7 @@ def _angle_between(first: Sequence[float] | None, second: Sequence[float] | None
     return f", rotated by {angle(float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))}"
 
 
-def _rule(joint: Joint) -> str:
+def _rule(joint: ReportedJoint) -> str:
     rule = joint["mimic"]
     return rule_words(rule["leader"], rule["multiplier"], rule["offset"]) if rule else "none"
 
@@ -101,7 +109,7 @@ def _names(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def document(old: Document, new: Document, found: Comparison) -> TextDocument:
+def document(old: Document, new: Document, found: ReportComparison) -> TextDocument:
     parts: list[str | Table] = [
         f"{title}: {one['started']}, {summary(one)}" for title, one in (("old", old), ("new", new))
     ]
@@ -113,19 +121,19 @@ def document(old: Document, new: Document, found: Comparison) -> TextDocument:
     return TextDocument("", [*parts, Strong(f"{verdict(found)} ({_exit(found)})", style)])
 
 
-def verdict(found: Comparison) -> str:
+def verdict(found: ReportComparison) -> str:
     if found.regressions:
         return f"{counted(len(found.regressions), 'regression')}, {counted(len(found.changes), 'change')}"
     return f"no regression, {counted(len(found.changes), 'change')}"
 
 
-def _exit(found: Comparison) -> str:
+def _exit(found: ReportComparison) -> str:
     if found.regressions:
         return "exit 1: a regression"
     return "exit 0: changes without a regression" if found.changes else "exit 0"
 
 
-def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LIMIT) -> str:
+def markdown_of(old: Document, new: Document, found: ReportComparison, limit: int = LIMIT) -> str:
     mark = "❌" if found.regressions else "✅"
     lines = [f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}", ""]
     lines += ["| worst, eps·scale | old | new |", "| --- | ---: | ---: |"]
@@ -148,7 +156,7 @@ def markdown_of(old: Document, new: Document, found: Comparison, limit: int = LI
     return "\n".join([*lines, ""])
 
 
-def _row(change: Change) -> str:
+def _row(change: ReportChange) -> str:
     where = f"{change.robot}: " if change.robot else ""
     cells = [where + change.what, change.old, change.new]
     mark = "❌ regression" if change.regression else ""
@@ -170,7 +178,7 @@ _SHARE_FLOOR = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ReportChange:
     """One difference of two reports.
 
     Attributes:
@@ -191,14 +199,14 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class ReportComparison:
     """All changes between two reports, and the SHA-256 of each robot's text in the new report."""
 
-    changes: tuple[Change, ...]
+    changes: tuple[ReportChange, ...]
     sha256: tuple[str | None, ...] = ()
 
     @property
-    def regressions(self) -> tuple[Change, ...]:
+    def regressions(self) -> tuple[ReportChange, ...]:
         return tuple(change for change in self.changes if change.regression)
 
     @property
@@ -238,7 +246,7 @@ class ComparisonDocument(Header):
 
 
 #: Layout of the document
-COMPARISON = Layout(
+COMPARISON = DocumentKind(
     "urdfkin-comparison/1",
     ComparisonDocument,
     ("no regression", "regression"),
@@ -246,57 +254,57 @@ COMPARISON = Layout(
 )
 
 
-def compare(old: Document, new: Document, factor: float = FACTOR) -> Comparison:
+def compare(old: Document, new: Document, factor: float = FACTOR) -> ReportComparison:
     """Compare two reports.
 
     The largest disagreement of a robot may grow by `factor` without a regression.
     """
     changes = [*_run(old, new), *_robots(old, new, factor)]
-    return Comparison(tuple(changes), tuple(new["sha256"]))
+    return ReportComparison(tuple(changes), tuple(new["sha256"]))
 
 
-def _run(old: Document, new: Document) -> Iterator[Change]:
+def _run(old: Document, new: Document) -> Iterator[ReportChange]:
     yield from _mapping("version of ", old["versions"], new["versions"])
     yield from _mapping("", *({"seed": str(d["seed"])} for d in (old, new)))
     if old["samples"] != new["samples"]:
         fewer = new["samples"] < old["samples"]
-        yield Change(None, "samples", f"{old['samples']:,}", f"{new['samples']:,}", regression=fewer)
+        yield ReportChange(None, "samples", f"{old['samples']:,}", f"{new['samples']:,}", regression=fewer)
     ends = [outcome_of(d) for d in (old, new)]
     if ends[0] != ends[1]:
         before, after = (f"not passed, {end.reason}" if end.reason else "passed" for end in ends)
-        yield Change(None, "outcome", before, after, regression=ends[0].passed)
+        yield ReportChange(None, "outcome", before, after, regression=ends[0].passed)
     if old["interrupted"] != new["interrupted"]:
         before, after = ("interrupted" if d["interrupted"] else "finished" for d in (old, new))
-        yield Change(None, "run", before, after, regression=new["interrupted"])
+        yield ReportChange(None, "run", before, after, regression=new["interrupted"])
 
 
-def _mapping(prefix: str, old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[Change]:
+def _mapping(prefix: str, old: Mapping[str, str], new: Mapping[str, str]) -> Iterator[ReportChange]:
     for key in dict.fromkeys([*old, *new]):
         if old.get(key) != new.get(key):
-            yield Change(None, prefix + key, old.get(key, ""), new.get(key, ""))
+            yield ReportChange(None, prefix + key, old.get(key, ""), new.get(key, ""))
 
 
-def _robots(old: Document, new: Document, factor: float) -> Iterator[Change]:
+def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChange]:
     before, after = by_source(old), by_source(new)
     renamed = renamed_files(before, after)
     for source in dict.fromkeys([*before, *after]):
         if source in renamed:
-            yield Change(source, "file", source, renamed[source])
+            yield ReportChange(source, "file", source, renamed[source])
             yield from _robot(source, before[source], after[renamed[source]], factor)
         elif source in renamed.values():
             continue
         elif source not in after:
-            yield Change(source, "robot", before[source]["verdict"], "", regression=True)
+            yield ReportChange(source, "robot", before[source]["verdict"], "", regression=True)
         elif source not in before:
             verdict = after[source]["verdict"]
-            yield Change(source, "robot", "", verdict, regression=verdict != "verified")
+            yield ReportChange(source, "robot", "", verdict, regression=verdict != "verified")
         else:
             yield from _robot(source, before[source], after[source], factor)
 
 
-def by_source(document: Document) -> dict[str, Robot]:
+def by_source(document: Document) -> dict[str, ReportedRobot]:
     """Return robots by their source. If a source occurs several times, a number is added to its name."""
-    named: dict[str, Robot] = {}
+    named: dict[str, ReportedRobot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1
         while source in named:
@@ -306,7 +314,7 @@ def by_source(document: Document) -> dict[str, Robot]:
     return named
 
 
-def renamed_files(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> dict[str, str]:
+def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]) -> dict[str, str]:
     """Return renamed files: a missing and a new source have the same robot name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
@@ -314,7 +322,9 @@ def renamed_files(before: Mapping[str, Robot], after: Mapping[str, Robot]) -> di
     }
 
 
-def _by_name(robots: Mapping[str, Robot], others: Mapping[str, Robot]) -> dict[str, list[str]]:
+def _by_name(
+    robots: Mapping[str, ReportedRobot], others: Mapping[str, ReportedRobot]
+) -> dict[str, list[str]]:
     """Return, for each robot name, the sources in `robots` that are missing in `others`."""
     named: dict[str, list[str]] = {}
     for source, robot in robots.items():
@@ -323,18 +333,18 @@ def _by_name(robots: Mapping[str, Robot], others: Mapping[str, Robot]) -> dict[s
     return named
 
 
-def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Change]:
+def _robot(source: str, old: ReportedRobot, new: ReportedRobot, factor: float) -> Iterator[ReportChange]:
     if old["verdict"] != new["verdict"]:
         worse = VERDICTS.index(new["verdict"]) < VERDICTS.index(old["verdict"])
-        yield Change(source, "verdict", old["verdict"], new["verdict"], regression=worse)
+        yield ReportChange(source, "verdict", old["verdict"], new["verdict"], regression=worse)
     for what, n_old, n_new in (
         ("joints", len(old["joints"]), len(new["joints"])),
         ("frames", len(old["frames"]), len(new["frames"])),
     ):
         if n_old != n_new:
-            yield Change(source, what, str(n_old), str(n_new))
+            yield ReportChange(source, what, str(n_old), str(n_new))
     for what, was, now in model_changes(old["model"], new["model"]):
-        yield Change(source, what, was, now)
+        yield ReportChange(source, what, was, now)
     yield from _tables(source, old, new)
     yield from _findings(source, old, new)
     same = old["joints"] == new["joints"]
@@ -342,28 +352,28 @@ def _robot(source: str, old: Robot, new: Robot, factor: float) -> Iterator[Chang
     after = {check_name(check): check for check in new["checks"]}
     for name in dict.fromkeys([*before, *after]):
         if name not in after:
-            yield Change(source, name, "compared", "", regression=True)
+            yield ReportChange(source, name, "compared", "", regression=True)
         elif name not in before:
-            yield Change(source, name, "", "compared", regression=bool(after[name]["failed"]))
+            yield ReportChange(source, name, "", "compared", regression=bool(after[name]["failed"]))
         else:
             yield from _check(source, name, before[name], after[name], factor, same_joints=same)
 
 
-def _tables(source: str, old: Robot, new: Robot) -> Iterator[Change]:
+def _tables(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[ReportChange]:
     """Yield a change for each table that Pinocchio checked in only one of the two reports."""
     before, after = ({(c["base"], c["tip"]): bool(c["samples"]) for c in r["chains"]} for r in (old, new))
     for base, tip in dict.fromkeys([*before, *after]):
         ends = [compared.get((base, tip), False) for compared in (before, after)]
         if ends[0] != ends[1]:
             was, now = ("compared" if end else "" for end in ends)
-            yield Change(source, f"tables from {base} to {tip}", was, now, regression=ends[0])
+            yield ReportChange(source, f"tables from {base} to {tip}", was, now, regression=ends[0])
 
 
 def _check(
-    source: str, name: str, old: Check, new: Check, factor: float, *, same_joints: bool
-) -> Iterator[Change]:
-    def change(words: Callable[[Check], str], regression: bool) -> Change:
-        return Change(source, name, words(old), words(new), regression)
+    source: str, name: str, old: ReportedCheck, new: ReportedCheck, factor: float, *, same_joints: bool
+) -> Iterator[ReportChange]:
+    def change(words: Callable[[ReportedCheck], str], regression: bool) -> ReportChange:
+        return ReportChange(source, name, words(old), words(new), regression)
 
     if old["failed"] != new["failed"]:
         yield change(lambda c: f"{c['failed']:,} outside the bound", new["failed"] > old["failed"])
@@ -382,7 +392,7 @@ def _check(
         yield change(lambda c: f"{percent(c['share_of_bound'])} of the bound", grew)
 
 
-def _ends(check: Check) -> str:
+def _ends(check: ReportedCheck) -> str:
     return " to ".join("none" if end is None else f"{end:g}" for end in check["bound"])
 
 
@@ -392,7 +402,7 @@ def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
     return new is None or (new > floor and new > factor * old)
 
 
-def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
+def _findings(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[ReportChange]:
     """Yield a change for each code whose number of errors or warnings changed."""
     counts: list[dict[str, int]] = [{}, {}]
     for count, robot in zip(counts, (old, new), strict=True):
@@ -403,7 +413,7 @@ def _findings(source: str, old: Robot, new: Robot) -> Iterator[Change]:
     for key in sorted(counts[0].keys() | counts[1].keys()):
         before, after = counts[0].get(key, 0), counts[1].get(key, 0)
         if before != after:
-            yield Change(source, key, str(before or ""), str(after or ""))
+            yield ReportChange(source, key, str(before or ""), str(after or ""))
 
 
 def figures(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:

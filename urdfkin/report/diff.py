@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any, cast
 
-from urdfkin.comparison.diff import Change, Changes, motion_words, word
+from urdfkin.comparison.diff import Changes, ModelChange, motion_words, word
 from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
@@ -56,7 +56,7 @@ def pairs_markdown(found: Sequence[Changes]) -> str:
 def lines_of(found: Changes) -> list[str]:
     """Return the changes as lines; a changed joint also has a line with the distance that a frame moves."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
-    by_element: dict[str, list[Change]] = {}
+    by_element: dict[str, list[ModelChange]] = {}
     for change in found.changes:
         by_element.setdefault(change.element, []).append(change)
     for element, changes in by_element.items():

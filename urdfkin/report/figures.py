@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from urdfkin.report.words import of_quantity, quantities, quantity_name, units, worst
-from urdfkin.validation.document import Chain, Check, Model, Robot, Table
+from urdfkin.validation.document import Chain, ReportedCheck, ReportedDHTable, ReportedModel, ReportedRobot
 from urdfkin.view.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _LEFT = 1e-2
 _HEIGHT = 0.82
 
 
-def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
+def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> str:
     """Return the plot of one robot as inline SVG; empty if nothing was compared."""
     names = quantities([robot])
     if not names:
@@ -51,13 +51,13 @@ def distributions(robot: Robot, edges: Sequence[float], prefix: str) -> str:
         )
 
 
-def _right(checks: Sequence[Check], edges: Sequence[float]) -> float:
+def _right(checks: Sequence[ReportedCheck], edges: Sequence[float]) -> float:
     """Return the right end of the axis, which is larger than every bound and every finite disagreement."""
     ends = [check["bound"][1] or 1.0 for check in checks] + [check["worst"] or 1.0 for check in checks]
     return float(min(max(ends) * 2.0, edges[-1] * 10.0))
 
 
-def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray, right: float) -> None:
+def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarray, right: float) -> None:
     counts = np.sum([check["histogram"] for check in checks], axis=0)
     results = counts.sum()
     first = int(np.searchsorted(edges, _LEFT))
@@ -108,7 +108,7 @@ def _row(axes: Axes, base: int, checks: Sequence[Check], edges: np.ndarray, righ
         )
 
 
-def _bound(axes: Axes, base: int, checks: Sequence[Check]) -> None:
+def _bound(axes: Axes, base: int, checks: Sequence[ReportedCheck]) -> None:
     lows = [check["bound"][0] for check in checks if check["bound"][0] is not None]
     highs = [check["bound"][1] for check in checks if check["bound"][1]]
     if lows and highs:
@@ -150,7 +150,7 @@ def _decorate(axes: Axes, names: Sequence[str], right: float) -> None:
 _KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 
 
-def scene(model: Model, chains: list[Chain]) -> dict[str, Any]:
+def scene(model: ReportedModel, chains: list[Chain]) -> dict[str, Any]:
     """Return a robot as data for the script of the page, `assets/view3d.js`.
 
     Entries of the dict, among others:
@@ -181,7 +181,7 @@ def scene(model: Model, chains: list[Chain]) -> dict[str, Any]:
     }
 
 
-def _joint(model: Model, i: int, links: dict[str, int]) -> list[Any]:
+def _joint(model: ReportedModel, i: int, links: dict[str, int]) -> list[Any]:
     joint = model["joints"][i]
     limit, mimic = joint["limit"], joint["mimic"]
     return [
@@ -198,7 +198,7 @@ def _joint(model: Model, i: int, links: dict[str, int]) -> list[Any]:
     ]
 
 
-def _table(table: Table, joints: dict[str, int]) -> dict[str, Any]:
+def _table(table: ReportedDHTable, joints: dict[str, int]) -> dict[str, Any]:
     return {
         "base": [_short(x) for row in table["base"][:3] for x in row],
         "tool": [_short(x) for row in table["tool"][:3] for x in row],

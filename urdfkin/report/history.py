@@ -19,13 +19,13 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.display import Strong, Table, TextDocument
-from urdfkin.report.compare import Change, ChangeEntry, by_source, compare, renamed_files
+from urdfkin.report.compare import ChangeEntry, ReportChange, by_source, compare, renamed_files
 from urdfkin.report.html import rendered, when
 from urdfkin.report.reading import checked, stored_document
 from urdfkin.report.words import VERDICTS, counted, percent, share_of, units, worst
-from urdfkin.system.documents import Count, Header, Layout, Sha256, parse_json, plain, says
+from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, parse_json, plain, says
 from urdfkin.system.files import MOST, is_folder, read_bytes, shortened
-from urdfkin.validation.document import VALIDATION, Document, Robot, Units
+from urdfkin.validation.document import VALIDATION, Document, ReportedRobot, Units
 from urdfkin.validation.outcome import OUTCOMES
 from urdfkin.verify.oracles import versions
 
@@ -43,7 +43,7 @@ MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input"
 _LOWEST = -3.0
 
 
-class Run(TypedDict):
+class ValidationRun(TypedDict):
     """One validation run, as the history lists it."""
 
     file: Annotated[str, says("The report: a JSON file, or the folder of `validate --store`.")]
@@ -100,14 +100,14 @@ class Unused(TypedDict):
 class HistoryDocument(Header):
     """The output of `urdfkin report history --format json`, with verdict and `sha256` of the latest run."""
 
-    runs: Annotated[list[Run], says("The runs, the oldest first.")]
+    runs: Annotated[list[ValidationRun], says("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], says("The robots; worse verdicts first.")]
     unusable: Annotated[list[Unused], says("Files that cannot be used, each with the reason.")]
     repeated: Annotated[list[Unused], says("Files that repeat a validation run of another file.")]
 
 
 #: Layout of the document
-HISTORY = Layout(
+HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
@@ -128,7 +128,7 @@ class History:
         repeated: Files that repeat the run of another file. The value is the name of the other file.
     """
 
-    runs: list[Run] = field(default_factory=list)
+    runs: list[ValidationRun] = field(default_factory=list)
     robots: dict[str, list[Point]] = field(default_factory=dict)
     unusable: list[Unused] = field(default_factory=list)
     repeated: list[Unused] = field(default_factory=list)
@@ -269,7 +269,7 @@ def _read(path: Path) -> Document:
     return checked(parse_json(read_bytes(path, MOST), str(path)), str(path))
 
 
-def _run(file: str, document: Document, before: Document | None) -> Run:
+def _run(file: str, document: Document, before: Document | None) -> ValidationRun:
     robots = document["robots"]
     return {
         "file": file,
@@ -296,7 +296,7 @@ def _add(found: History, before: Document | None, document: Document) -> None:
         found.robots.setdefault(source, []).append(_point(len(found.runs) - 1, source, robot))
 
 
-def _point(run: int, source: str, robot: Robot) -> Point:
+def _point(run: int, source: str, robot: ReportedRobot) -> Point:
     counts = Counter[str]()
     for finding in robot["findings"]:
         counts[finding["severity"]] += 1 + len(finding["also"])
@@ -403,16 +403,16 @@ def _of(told: Told, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
 
 
 def words_of(change: ChangeEntry) -> str:
-    words = str(Change(**change))
+    words = str(ReportChange(**change))
     return f"REGRESSION {words}" if change["regression"] else words
 
 
-def _share(one: Run | Point) -> str:
+def _share(one: ValidationRun | Point) -> str:
     """Return the largest ratio of a disagreement to its bound as text; empty if nothing was compared."""
     return percent(one["share_of_bound"]) if one["results"] else ""
 
 
-def _date(run: Run) -> str:
+def _date(run: ValidationRun) -> str:
     return run["started"][:16].replace("T", " ")
 
 

@@ -38,7 +38,7 @@ from urdfkin.report.words import (
     worst,
 )
 from urdfkin.system.lazy_import import install_remedy
-from urdfkin.validation.document import Document, Robot, outcome_of
+from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 from urdfkin.validation.robot_summary import chain_disagreement
 from urdfkin.verify.quantities import compared, not_compared
 from urdfkin.view.figure import installed
@@ -162,7 +162,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
     )
 
 
-def _summary(robot: Robot, index: int) -> dict[str, Any]:
+def _summary(robot: ReportedRobot, index: int) -> dict[str, Any]:
     """Return the data for the heading of a robot's section; a closed section shows only its heading."""
     opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
     return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
@@ -220,7 +220,7 @@ def _model_verdict(document: Document) -> dict[str, Any]:
     }
 
 
-def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
+def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, Any]:
     model = robot["model"]
     heads, heat = pages.heat_map(robot, model) if model and robot["checks"] else ([], [])
     return {
@@ -262,7 +262,7 @@ def _robot(robot: Robot, index: int, document: Document) -> dict[str, Any]:
     }
 
 
-def _plot(robot: Robot, index: int, document: Document) -> str:
+def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
     """Return the plot of a robot, or an empty text.
 
     The text is empty if matplotlib is not installed, or if the plots of all robots would take too long. The

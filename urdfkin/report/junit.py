@@ -20,7 +20,7 @@ from urdfkin.report.words import (
     second_oracle_title,
     units,
 )
-from urdfkin.validation.document import Case, Check, Document, Robot, outcome_of
+from urdfkin.validation.document import Case, Document, ReportedCheck, ReportedRobot, outcome_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +80,7 @@ def _function_case(check: FunctionCheck) -> ET.Element:
 _COUNTS = ("tests", "failures", "errors")
 
 
-def _suite(robot: Robot, document: Document) -> ET.Element:
+def _suite(robot: ReportedRobot, document: Document) -> ET.Element:
     name = _clean(robot["source"])
     cases = [*(_case(check, robot) for check in in_order(robot)), _verdict(robot)]
     facts = {"robot": robot["name"], "verdict": robot["verdict"], "seed": str(document["seed"])}
@@ -123,7 +123,7 @@ def _whole_run(document: Document) -> ET.Element:
     return _suite_element("the whole run", [case], document["versions"], document["seconds"], document)
 
 
-def _case(check: Check, robot: Robot) -> ET.Element:
+def _case(check: ReportedCheck, robot: ReportedRobot) -> ET.Element:
     case = ET.Element(
         "testcase", {"name": check_name(check), "classname": f"urdfkin.{_clean(robot['source'])}"}
     )
@@ -139,7 +139,7 @@ def _case(check: Check, robot: Robot) -> ET.Element:
     return case
 
 
-def _verdict(robot: Robot) -> ET.Element:
+def _verdict(robot: ReportedRobot) -> ET.Element:
     case = ET.Element("testcase", {"name": "verdict", "classname": f"urdfkin.{_clean(robot['source'])}"})
     reason = _clean(robot["reason"] or f"{robot['results']:,} results compared")
     text = f"{robot['verdict']}: {reason}" + (f"\n{_clean(error)}" if (error := robot.get("error")) else "")
@@ -152,7 +152,7 @@ def _verdict(robot: Robot) -> ET.Element:
     return case
 
 
-def _text(check: Check, robot: Robot) -> str:
+def _text(check: ReportedCheck, robot: ReportedRobot) -> str:
     case: Case | None = check["worst_case"]
     tightest, widest = check["bound"]
     lines = [

@@ -21,7 +21,7 @@ from urdfkin.report.words import (
     units,
     worst_of,
 )
-from urdfkin.validation.document import Document, Robot, outcome_of
+from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 
 #: GitHub accepts comments of up to 65,536 characters.
 LIMIT = 60_000
@@ -60,7 +60,7 @@ def as_markdown(document: Document) -> str:
     return "\n".join(head + _body(robots, room) + foot)
 
 
-def _three_sides(robots: list[Robot]) -> list[str]:
+def _three_sides(robots: list[ReportedRobot]) -> list[str]:
     if (title := second_oracle_title(robots)) is None:
         return []
     heads = ["quantity", *map(text, second_oracle_heads(title))]
@@ -75,7 +75,7 @@ def _three_sides(robots: list[Robot]) -> list[str]:
     return [*lines, ""]
 
 
-def _body(robots: list[Robot], room: int) -> list[str]:
+def _body(robots: list[ReportedRobot], room: int) -> list[str]:
     quantities = columns(robots)
     heads = ["robot", "joints", "frames", "results", *map(text, quantities), "of bound", "verdict"]
     lines = [_row(heads), _row(["---", *["---:"] * (len(heads) - 2), "---"])]
@@ -98,7 +98,7 @@ def _body(robots: list[Robot], room: int) -> list[str]:
     return lines + tails
 
 
-def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
+def _cells(robot: ReportedRobot, quantities: list[tuple[str, ...]]) -> list[str]:
     verdict = robot["verdict"]
     share = percent(share_of(robot)) if robot["checks"] else ""
     return [
@@ -112,7 +112,7 @@ def _cells(robot: Robot, quantities: list[tuple[str, ...]]) -> list[str]:
     ]
 
 
-def _details(robot: Robot) -> list[str]:
+def _details(robot: ReportedRobot) -> list[str]:
     lines: list[str] = []
     if robot["reason"]:
         lines += ["", f"**{markdown_code(robot['source'])}**: {text(shortened(robot['reason'], 600))}"]

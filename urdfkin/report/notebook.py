@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-class Cell:
+class NotebookView:
     """The 3D view that `Robot.view` returns in a notebook: `q` (nq,) at the start, `height` in pixels."""
 
     def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:

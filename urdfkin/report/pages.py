@@ -24,7 +24,17 @@ from urdfkin.report.words import (
     worst,
     worst_of,
 )
-from urdfkin.validation.document import Chain, Check, Joint, Judgement, Limit, Model, Robot, Row, Units
+from urdfkin.validation.document import (
+    Chain,
+    ReportedAccuracy,
+    ReportedCheck,
+    ReportedDHRow,
+    ReportedJoint,
+    ReportedLimit,
+    ReportedModel,
+    ReportedRobot,
+    Units,
+)
 
 _READABLE = DisplayUnits(digits=6)
 
@@ -34,12 +44,12 @@ HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class HeatCell:
     text: str
     step: int
 
 
-def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
+def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> dict[str, Any]:
     checks = robot["checks"]
     largest, share = worst(check["worst"] for check in checks), share_of(robot)
     return {
@@ -62,7 +72,7 @@ def overview(robot: Robot, quantities_of: Sequence[Sequence[str]]) -> dict[str, 
     }
 
 
-def reason(robot: Robot) -> str:
+def reason(robot: ReportedRobot) -> str:
     """Return the reason of a verdict without the errors of the file, which the page lists as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
@@ -70,11 +80,11 @@ def reason(robot: Robot) -> str:
     return "\n".join([first, *others])
 
 
-def _findings(robot: Robot, severity: str) -> int:
+def _findings(robot: ReportedRobot, severity: str) -> int:
     return sum(finding["severity"] == severity for finding in robot["findings"])
 
 
-def _key(robot: Robot, names: Sequence[str]) -> float:
+def _key(robot: ReportedRobot, names: Sequence[str]) -> float:
     checks = column(robot, names)
     return _sortable(worst(check["worst"] for check in checks)) if checks else -1.0
 
@@ -83,7 +93,7 @@ def _sortable(value: Units) -> float:
     return 1e308 if value is None else value
 
 
-def joint_rows(model: Model) -> list[dict[str, Any]]:
+def joint_rows(model: ReportedModel) -> list[dict[str, Any]]:
     """Return a row for each joint with its limits, in the order of q."""
     return [
         {
@@ -100,7 +110,7 @@ def joint_rows(model: Model) -> list[dict[str, Any]]:
     ]
 
 
-def _remaining_range(joint: Joint) -> str:
+def _remaining_range(joint: ReportedJoint) -> str:
     """Return a sentence about the part of a joint's range in which its mimic joints are within their limits.
 
     The text is empty if the mimic joints do not narrow the range.
@@ -117,7 +127,7 @@ def _remaining_range(joint: Joint) -> str:
     return f"{joint['name']}: its mimic joints are within limits only from {ends} ({', '.join(kept['by'])})."
 
 
-def _coordinate(joint: Joint) -> str:
+def _coordinate(joint: ReportedJoint) -> str:
     mimic = joint["mimic"]
     if joint["q"] is None:
         return ""
@@ -129,7 +139,7 @@ def _coordinate(joint: Joint) -> str:
     return f"{mimic['multiplier']:g} {place}{offset}"
 
 
-def _limits(limit: Limit | None, kind: str) -> dict[str, str]:
+def _limits(limit: ReportedLimit | None, kind: str) -> dict[str, str]:
     if limit is None:
         return {"lower": "", "upper": "", "velocity": "", "effort": ""}
     unit = "m" if kind == "prismatic" else "rad"
@@ -139,7 +149,9 @@ def _limits(limit: Limit | None, kind: str) -> dict[str, str]:
     return words
 
 
-def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, list[Cell]]]]:
+def heat_map(
+    robot: ReportedRobot, model: ReportedModel
+) -> tuple[list[str], list[tuple[str, list[HeatCell]]]]:
     """Return the column heads, and the name and cells of each moving joint.
 
     A cell shows the worst disagreement of all reference frames.
@@ -159,7 +171,7 @@ def heat_map(robot: Robot, model: Model) -> tuple[list[str], list[tuple[str, lis
     return list(quantities_of), rows
 
 
-def _columns(model: Model) -> dict[str, list[int]]:
+def _columns(model: ReportedModel) -> dict[str, list[int]]:
     """For each joint, return the indices of its columns in the Jacobian with mimic joints."""
     own: dict[str, list[int]] = {}
     at = 0
@@ -170,18 +182,18 @@ def _columns(model: Model) -> dict[str, list[int]]:
     return own
 
 
-def _cell(checks: Sequence[Check], where: dict[str, list[int]]) -> Cell:
+def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatCell:
     found = [check["worst_by_subject"][i] for check in checks for i in where[check["subjects"]]]
     if not found:
-        return Cell("", 0)
+        return HeatCell("", 0)
     largest = worst(found)
     if largest is None:
-        return Cell("not finite", len(HEAT_STEPS) + 1)
+        return HeatCell("not finite", len(HEAT_STEPS) + 1)
     share = max(_share(check, i) for check in checks for i in where[check["subjects"]])
-    return Cell(units(largest), sum(share > edge for edge in HEAT_STEPS) + (share > 0.0))
+    return HeatCell(units(largest), sum(share > edge for edge in HEAT_STEPS) + (share > 0.0))
 
 
-def _share(check: Check, subject: int) -> float:
+def _share(check: ReportedCheck, subject: int) -> float:
     """Return an upper estimate of (disagreement / bound) for one frame, joint or column.
 
     The document does not contain the bound of a single frame, joint or column. Therefore, the function
@@ -208,11 +220,11 @@ def has_beta(chain: Chain) -> bool:
     return any(row["beta"] != 0.0 for key in ("standard", "modified") for row in _rows(chain, key))
 
 
-def _rows(chain: Chain, convention: str) -> list[Row]:
+def _rows(chain: Chain, convention: str) -> list[ReportedDHRow]:
     return chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
 
 
-def _dh_cells(row: Row, beta: bool) -> list[str]:
+def _dh_cells(row: ReportedDHRow, beta: bool) -> list[str]:
     sign = "+" if row["sense"] > 0 else "−"
     is_prismatic = row["kind"] == "prismatic"
     d, theta = metres(row["d"]), angle(row["theta"])
@@ -237,7 +249,7 @@ def angle(value: float) -> str:
     return _READABLE.angle(value, pi="π").replace("-", "−")
 
 
-def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
+def judged_rows(judgement: ReportedAccuracy) -> list[dict[str, Any]]:
     return [
         {
             "quantity": quantity_name(line["quantity"]),
@@ -251,7 +263,7 @@ def judged_rows(judgement: Judgement) -> list[dict[str, Any]]:
     ]
 
 
-def check_rows(robot: Robot) -> list[dict[str, Any]]:
+def check_rows(robot: ReportedRobot) -> list[dict[str, Any]]:
     return [
         {
             "quantity": quantity_name(check["quantity"]),
@@ -272,7 +284,7 @@ def check_rows(robot: Robot) -> list[dict[str, Any]]:
     ]
 
 
-def failures(robot: Robot) -> list[dict[str, Any]]:
+def failures(robot: ReportedRobot) -> list[dict[str, Any]]:
     """Return the rows of the failed checks, the largest ratio of a disagreement to its bound first."""
     failing = sorted(
         (check for check in robot["checks"] if check["failed"]),

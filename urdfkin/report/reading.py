@@ -19,16 +19,16 @@ from urdfkin.validation.chunk import SPECIAL
 from urdfkin.validation.document import (
     VALIDATION,
     Chain,
-    Check,
     Document,
-    Joint,
-    Model,
-    Robot,
+    ReportedCheck,
+    ReportedJoint,
+    ReportedModel,
+    ReportedRobot,
     Units,
     outcome_of,
 )
 from urdfkin.validation.error_stats import histogram_bin, percentile
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_summary import chain_disagreement, reader_disagreement
 
 #: nq and nv of joint kinds
@@ -39,25 +39,25 @@ _WITH_AXIS = ("revolute", "continuous", "prismatic")
 _ROUNDED = 1e-5
 
 
-def frame_names(model: Model) -> list[str]:
+def frame_names(model: ReportedModel) -> list[str]:
     """Return the names of the compared frames: every link, then every joint."""
     return [f"link:{name}" for name in model["links"]] + [f"joint:{j['name']}" for j in model["joints"]]
 
 
-def moving_names(model: Model) -> list[str]:
+def moving_names(model: ReportedModel) -> list[str]:
     return [joint["name"] for joint in model["joints"] if joint["kind"] != "fixed"]
 
 
-def column_names(model: Model) -> list[str]:
+def column_names(model: ReportedModel) -> list[str]:
     """Return the joint name of each Jacobian column, if mimic joints have their own columns."""
     return [joint["name"] for joint in model["joints"] for _ in range(_size(joint)[1])]
 
 
-def _size(joint: Joint) -> tuple[int, int]:
+def _size(joint: ReportedJoint) -> tuple[int, int]:
     return _SIZES.get(joint["kind"], _ONE)
 
 
-def model_contradictions(model: Model, chains: Sequence[Chain]) -> Iterator[str]:
+def model_contradictions(model: ReportedModel, chains: Sequence[Chain]) -> Iterator[str]:
     links, joints = model["links"], model["joints"]
     names = [joint["name"] for joint in joints]
     if len(set(links)) != len(links) or len(set(names)) != len(names):
@@ -87,7 +87,7 @@ def model_contradictions(model: Model, chains: Sequence[Chain]) -> Iterator[str]
                 )
 
 
-def _joint(joint: Joint, joints: Sequence[Joint]) -> Iterator[str]:
+def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[str]:
     where, axis, mimic = f"`model`: joint {joint['name']}", joint["axis"], joint["mimic"]
     if (axis is not None) != (joint["kind"] in _WITH_AXIS):
         yield f"{where}: a {joint['kind']} joint must {'not ' if axis else ''}have an axis"
@@ -107,7 +107,7 @@ def _joint(joint: Joint, joints: Sequence[Joint]) -> Iterator[str]:
 _PAIRS = [(i, j) for i in range(3) for j in range(i + 1)]
 
 
-def _numbering(model: Model) -> Iterator[str]:
+def _numbering(model: ReportedModel) -> Iterator[str]:
     """Yield errors of the indices in q and v. A mimic joint has the indices of its mimicked joint."""
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:
@@ -156,7 +156,7 @@ def contradictions(document: Document) -> Iterator[str]:
             yield f"robots[{i}] ({robot['source']}): {contradiction}"
 
 
-def _robot(robot: Robot, document: Document) -> Iterator[str]:
+def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
     if robot["model"] is not None:
         yield from model_contradictions(robot["model"], robot["chains"])
     elif robot["checks"] or robot["chains"]:
@@ -187,15 +187,15 @@ def _robot(robot: Robot, document: Document) -> Iterator[str]:
             yield f"tables from {ends}: the tables have results, but were not compared"
 
 
-def _subjects(robot: Robot) -> dict[str, list[str]]:
+def _subjects(robot: ReportedRobot) -> dict[str, list[str]]:
     model = robot["model"]
     if model is None:
         return {"frames": [], "joints": [], "columns": []}
     return {"frames": frame_names(model), "joints": moving_names(model), "columns": column_names(model)}
 
 
-def _verdict(robot: Robot, samples: int) -> Iterator[str]:
-    verdict, reason = Verdict(robot["verdict"]), robot["reason"]
+def _verdict(robot: ReportedRobot, samples: int) -> Iterator[str]:
+    verdict, reason = ValidationVerdict(robot["verdict"]), robot["reason"]
     second_differs = any(
         check["second_oracle"]["urdfkin"]["failed"] for check in robot["checks"] if "second_oracle" in check
     )
@@ -206,24 +206,26 @@ def _verdict(robot: Robot, samples: int) -> Iterator[str]:
         or any(chain_disagreement(chain) for chain in robot["chains"])
         or (reading is not None and reader_disagreement(reading) is not None)
     )
-    if outside != (verdict is Verdict.DISAGREES):
+    if outside != (verdict is ValidationVerdict.DISAGREES):
         yield (
             f"`verdict` is {verdict}, but {'something lies' if outside else 'nothing lies'} outside its bound"
         )
-    if verdict is Verdict.VERIFIED:
+    if verdict is ValidationVerdict.VERIFIED:
         if not robot["results"]:
             yield "`verdict` is verified, but nothing was compared"
         if reason is not None:
             yield f"`verdict` is verified, but `reason` says {reason}"
         if robot["samples"] != samples:
             yield f"`verdict` is verified, but only {robot['samples']} of {samples} samples were compared"
-    elif verdict is not Verdict.DISAGREES and not reason:
+    elif verdict is not ValidationVerdict.DISAGREES and not reason:
         yield f"`verdict` is {verdict}, but there is no `reason`"
     if robot["samples"] > samples:
         yield f"`samples` is {robot['samples']}, but {samples} samples were requested"
 
 
-def _check(check: Check, subjects: list[str], robot: Robot, document: Document) -> Iterator[str]:
+def _check(
+    check: ReportedCheck, subjects: list[str], robot: ReportedRobot, document: Document
+) -> Iterator[str]:
     results, histogram, edges = check["results"], check["histogram"], document["histogram_edges"]
     if results != robot["samples"] * len(subjects) or results > _MOST:
         yield (
@@ -252,7 +254,7 @@ def _check(check: Check, subjects: list[str], robot: Robot, document: Document) 
     yield from _case(check, subjects, robot, document["samples"] + SPECIAL)
 
 
-def _share(check: Check) -> Iterator[str]:
+def _share(check: ReportedCheck) -> Iterator[str]:
     """Yield an error if `share_of_bound` contradicts the disagreements and bounds in the document.
 
     The smallest possible value of `share_of_bound` is the worst disagreement divided by the largest bound.
@@ -271,7 +273,7 @@ def _share(check: Check) -> Iterator[str]:
         yield f"`share_of_bound` is {share:g}, but `worst` is {largest:g} and `bound` is {low:g} to {high:g}"
 
 
-def _case(check: Check, subjects: list[str], robot: Robot, samples: int) -> Iterator[str]:
+def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, samples: int) -> Iterator[str]:
     case, model = check["worst_case"], robot["model"]
     if case is None:
         if check["worst"] != 0.0 or check["failed"]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.comparison.result import BOUNDED, Interval, Question, Sameness, Verdict, angle, length, up_to
+from urdfkin.comparison.result import BOUNDED, Interval, Sameness, SameQuestion, Verdict, angle, length, up_to
 from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
@@ -29,7 +29,7 @@ HEADS = ("frame", "at least", "at most", "angle at most")
 #: These attributes of `Interval` are the largest found angle, and the proven bound on the angle.
 TURNED = ("radians_seen", "radians")
 #: This question asks whether the two robots are equivalent.
-EQUIVALENT = Question()
+EQUIVALENT = SameQuestion()
 #: A distance is printed only if its bound is larger than DUST times the rounding error.
 #: The sum of several terms has additional rounding errors, so DUST is larger than 1.
 DUST = 1.001
@@ -37,7 +37,7 @@ DUST = 1.001
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
-def headline(found: Sameness, question: Question = EQUIVALENT) -> str:
+def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     limits = sum(one.what == "limits" for one in found.remarks)
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if question.within is not None:
@@ -178,7 +178,7 @@ def renamed(found: Sameness) -> list[str]:
     return joints + [f"link {ours} is {theirs}" for ours, theirs in found.links if ours != theirs]
 
 
-def document(found: Sameness, question: Question = EQUIVALENT, *, all_: bool = False) -> TextDocument:
+def document(found: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
     """Return the answer and its reasons; with `all_`, show every line, not only the first dozen of a kind."""
     sources = zip("AB", found.names, found.sources, strict=True)
     parts: list[str | Table] = [f"{which}: {name} ({source})" for which, name, source in sources]
@@ -211,7 +211,7 @@ def _reasons(found: Sameness) -> tuple[tuple[str, ...], list[str]]:
 PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
 
 
-def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str, ...]]:
+def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
     """Return a row for each pair: sources, verdict, largest distance, largest single-precision distance."""
     rows = list[tuple[str, ...]]()
     for one in found:
@@ -227,7 +227,7 @@ def _pair_rows(found: Sequence[Sameness], question: Question) -> list[tuple[str,
     return rows
 
 
-def pairs_document(found: Sequence[Sameness], question: Question = EQUIVALENT) -> TextDocument:
+def pairs_document(found: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> TextDocument:
     """Return a table of several pairs of models, followed by a line for each pair that differs."""
     rows = _pair_rows(found, question)
     different = [
@@ -238,7 +238,7 @@ def pairs_document(found: Sequence[Sameness], question: Question = EQUIVALENT) -
     return TextDocument("", [Table(PAIRS, rows, left=3), *different])
 
 
-def pairs_markdown(found: Sequence[Sameness], question: Question = EQUIVALENT) -> str:
+def pairs_markdown(found: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> str:
     rows = [PAIRS, ("---",) * len(PAIRS), *_pair_rows(found, question)]
     lines = [f"| {' | '.join(map(markdown_text, row) if k != 1 else row)} |" for k, row in enumerate(rows)]
     return "\n".join(lines) + "\n"
@@ -282,7 +282,7 @@ def _rest(n: int, some: int | None) -> list[str]:
     return [f"  ... and {n - some} more: --all shows them"] if some is not None and n > some else []
 
 
-def markdown_of(found: Sameness, question: Question = EQUIVALENT) -> str:
+def markdown_of(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     mark = "✅" if found.holds(question) else "❌"
     text = markdown_text
     names = " and ".join(
@@ -326,7 +326,7 @@ VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.3
 def as_html(
     found: Sameness,
     robots: tuple[Robot, Robot],
-    question: Question = EQUIVALENT,
+    question: SameQuestion = EQUIVALENT,
     options: Sequence[str] = (),
     started: datetime | None = None,
 ) -> str:
@@ -365,7 +365,7 @@ def as_html(
     )
 
 
-def command_of(robots: tuple[Robot, Robot], question: Question, options: Sequence[str]) -> str:
+def command_of(robots: tuple[Robot, Robot], question: SameQuestion, options: Sequence[str]) -> str:
     words = [robot.origin.words for robot in robots]
     words += [] if question.within is None else [f"--within {question.within!r}"]
     words += ["--strict"] if question.strict else []

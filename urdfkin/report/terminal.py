@@ -34,7 +34,7 @@ from urdfkin.report.words import (
     worst,
     worst_of,
 )
-from urdfkin.validation.document import Document, Judgement, Robot, outcome_of
+from urdfkin.validation.document import Document, ReportedAccuracy, ReportedRobot, outcome_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,11 +76,11 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
         out.print(f"not passed: {found.reason}", style="bold red")
 
 
-def _counts(robot: Robot) -> list[str]:
+def _counts(robot: ReportedRobot) -> list[str]:
     return [robot["source"], str(len(robot["joints"])), str(len(robot["frames"])), f"{robot['results']:,}"]
 
 
-def _print_wide(robots: Sequence[Robot], out: Console) -> None:
+def _print_wide(robots: Sequence[ReportedRobot], out: Console) -> None:
     quantities_of = columns(robots)
     heads = ["robot", "joints", "frames", "results", *quantities_of, "verdict"]
     rows = [
@@ -90,7 +90,7 @@ def _print_wide(robots: Sequence[Robot], out: Console) -> None:
     print_table(out, Table(heads, rows, left=(0, len(heads) - 1)))
 
 
-def _print_robots(robots: Sequence[Robot], out: Console) -> None:
+def _print_robots(robots: Sequence[ReportedRobot], out: Console) -> None:
     heads = ["robot", "joints", "frames", "results", "worst", "of bound", "verdict"]
     rows = [
         [
@@ -104,7 +104,7 @@ def _print_robots(robots: Sequence[Robot], out: Console) -> None:
     print_table(out, Table(heads, rows, left=(0, 6)))
 
 
-def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
+def _print_quantities(robots: Sequence[ReportedRobot], out: Console) -> None:
     rows = []
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name)]
@@ -120,13 +120,13 @@ def _print_quantities(robots: Sequence[Robot], out: Console) -> None:
     print_table(out, Table(["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4)))
 
 
-def _three_sides(robots: Sequence[Robot], title: str) -> Table:
+def _three_sides(robots: Sequence[ReportedRobot], title: str) -> Table:
     rows = [[quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title)]
     heads = [head.replace(", ", ",\n") for head in second_oracle_heads(title)]
     return Table(["quantity", *heads], rows, left=(0, 5))
 
 
-def _print_checks(robot: Robot, out: Console) -> None:
+def _print_checks(robot: ReportedRobot, out: Console) -> None:
     heads = ["quantity, reference", "results", "outside", "median", "99 %", "worst", "of bound"]
     rows = [
         [
@@ -144,7 +144,7 @@ def _print_checks(robot: Robot, out: Console) -> None:
     print_table(out, Table(heads, rows))
 
 
-def _judged(judgement: Judgement) -> Table:
+def _judged(judgement: ReportedAccuracy) -> Table:
     """Return the errors of the accuracy study, with a row for each quantity and reference frame."""
     heads = ["quantity, reference", "numbers", "worst\nurdfkin", "\nPinocchio"]
     heads += ["typical\nurdfkin", "\nPinocchio", "smaller\nerror"]
@@ -161,7 +161,7 @@ def _judged(judgement: Judgement) -> Table:
     return Table(heads, rows)
 
 
-def _print_robot(robot: Robot, out: Console, *, cases: bool) -> None:
+def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
     if robot["reason"]:
         first, *rest = robot["reason"].split("\n")
         out.print(f"{robot['source']}: {robot['verdict']}: {first}")

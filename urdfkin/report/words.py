@@ -6,27 +6,35 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
-from urdfkin.validation.document import Check, Document, Judged, Judgement, Robot, SecondOracle, Units
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.document import (
+    Document,
+    Judged,
+    ReportedAccuracy,
+    ReportedCheck,
+    ReportedRobot,
+    SecondOracle,
+    Units,
+)
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES
 
 SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
 #: Verdicts, worse ones first
-VERDICTS = tuple(verdict.value for verdict in Verdict)
+VERDICTS = tuple(verdict.value for verdict in ValidationVerdict)
 
 
 def quantity_name(quantity: str) -> str:
     return QUANTITIES[quantity].title if quantity in QUANTITIES else quantity
 
 
-def check_name(check: Check) -> str:
+def check_name(check: ReportedCheck) -> str:
     """Return the quantity and reference frame of a check: `acceleration, local`."""
     reference = check["reference"]
     return check["quantity"] + (f", {reference}" if reference else "")
 
 
-def second_reader_words(robot: Robot) -> str:
+def second_reader_words(robot: ReportedRobot) -> str:
     """Return in words whether yourdfpy, the second reader, reads the same tree as urdfkin.
 
     The text is empty if there was no comparison.
@@ -71,21 +79,21 @@ def worst(values: Iterable[Units]) -> Units:
     return largest
 
 
-def quantities(robots: Sequence[Robot]) -> list[str]:
+def quantities(robots: Sequence[ReportedRobot]) -> list[str]:
     """Return the compared quantities of all robots; known quantities come first, in their usual order."""
     found = {check["quantity"] for robot in robots for check in robot["checks"]}
     return [q for q in QUANTITIES if q in found] + sorted(found - set(QUANTITIES))
 
 
-def of_quantity(robot: Robot, quantity: str) -> list[Check]:
+def of_quantity(robot: ReportedRobot, quantity: str) -> list[ReportedCheck]:
     return [check for check in robot["checks"] if check["quantity"] == quantity]
 
 
-def in_order(robot: Robot) -> list[Check]:
+def in_order(robot: ReportedRobot) -> list[ReportedCheck]:
     return column(robot, quantities([robot]))
 
 
-def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
+def columns(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
     """Return each heading of the table of robots with its quantities; an unknown one has its own heading."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
@@ -94,11 +102,11 @@ def columns(robots: Sequence[Robot]) -> dict[str, tuple[str, ...]]:
     return heads
 
 
-def column(robot: Robot, names: Sequence[str]) -> list[Check]:
+def column(robot: ReportedRobot, names: Sequence[str]) -> list[ReportedCheck]:
     return [check for name in names for check in of_quantity(robot, name)]
 
 
-def worst_of(robot: Robot, names: Sequence[str]) -> str:
+def worst_of(robot: ReportedRobot, names: Sequence[str]) -> str:
     """Return the text of a cell: the worst disagreement of several quantities in all reference frames."""
     checks = column(robot, names)
     return units(worst(check["worst"] for check in checks), compared=bool(checks))
@@ -118,13 +126,13 @@ def nearer_counts(lines: Sequence[Judged]) -> str:
     )
 
 
-def judged_on(judgement: Judgement) -> str:
+def judged_on(judgement: ReportedAccuracy) -> str:
     """Return in words the samples, the motion of the base, and the result of the accuracy study."""
     moving = " on a moving base" if judgement.get("moving_base") else ""
     return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
 
 
-def second_oracle_title(robots: Sequence[Robot]) -> str | None:
+def second_oracle_title(robots: Sequence[ReportedRobot]) -> str | None:
     names = (
         check["second_oracle"]["by"]
         for robot in robots
@@ -139,7 +147,7 @@ def second_oracle_heads(title: str) -> list[str]:
     return ["results", "urdfkin, Pinocchio", f"urdfkin, {title}", f"Pinocchio, {title}", "outlier"]
 
 
-def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[str, list[str]]]:
+def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[tuple[str, list[str]]]:
     """Yield each quantity with its cells for `second_oracle_heads`, over all robots."""
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name) if "second_oracle" in check]
@@ -147,7 +155,7 @@ def second_oracle_rows(robots: Sequence[Robot], title: str) -> Iterator[tuple[st
             yield name, second_oracle_cells(checks, title)
 
 
-def second_oracle_cells(checks: Sequence[Check], title: str) -> list[str]:
+def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str]:
     """Return the cells of a table row with the headings `second_oracle_heads`, for several checks.
 
     The cell of a pair of libraries contains the largest ratio of a disagreement to its bound.
@@ -172,7 +180,7 @@ def _alone(found: Sequence[SecondOracle], title: str) -> str:
     return ", ".join(f"{who} ({count:,})" for who, count in counts.items() if count) or "none"
 
 
-def share_of(robot: Robot) -> Units:
+def share_of(robot: ReportedRobot) -> Units:
     """Return the largest ratio of a disagreement to its bound."""
     return worst(check["share_of_bound"] for check in robot["checks"])
 

@@ -28,7 +28,7 @@ from urdfkin.verify.verifier import oracle_results_with_bound
 
 
 @dataclass(frozen=True, eq=False)
-class Check:
+class MotionCheck:
     """Comparison of a quantity from urdfkin with the same quantity from Pinocchio, for each sample.
 
     Attributes:
@@ -73,7 +73,7 @@ class FrameMotion:
     jacobian: FloatArray
     movable: NDArray[np.bool_]
     parts: AccelerationBreakdown
-    checks: dict[str, Check]
+    checks: dict[str, MotionCheck]
     not_verified: str | None
 
     def __repr__(self) -> str:
@@ -192,10 +192,10 @@ def frame_motion(
     )
 
 
-def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> Check:
+def _check(row: Quantity, robot: Robot, call: Call, ours: FloatArray) -> MotionCheck:
     theirs, bound = oracle_results_with_bound(
         row, robot.verifier.oracle(call.base), call.part(slice(0, call.n)), ours
     )
     units = worst_of_each(ours, theirs, bound.scale, 2)
     k = np.broadcast_to(result_k(bound, units.shape), units.shape)
-    return Check(units[:, 0], (units / k)[:, 0], k[:, 0])
+    return MotionCheck(units[:, 0], (units / k)[:, 0], k[:, 0])

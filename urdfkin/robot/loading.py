@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
-class How(TypedDict):
+class LoadOptions(TypedDict):
     """The arguments of `load` that apply to every kind of source."""
 
     verify: Verify
@@ -111,7 +111,7 @@ def load(  # noqa: PLR0911  each kind of source has a branch
     >>> float(robot.placement([0.0, 0.0], "tip")[0, 3])
     0.7
     """
-    how: How = {
+    how: LoadOptions = {
         "verify": verify,
         "mimic": mimic,
         "root_joint": root_joint,
@@ -162,7 +162,7 @@ def load(  # noqa: PLR0911  each kind of source has a branch
 def _load_table(
     source: DHTable | ProductOfExponentials | str | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
-    **how: Unpack[How],
+    **how: Unpack[LoadOptions],
 ) -> Robot:
     from urdfkin.dh.compare.slips import doubts  # noqa: PLC0415
     from urdfkin.dh.convert import to_urdf  # noqa: PLC0415
@@ -200,7 +200,7 @@ def _load_mjcf(
     source: str | bytes | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
     streamed: Text | None,
-    **how: Unpack[How],
+    **how: Unpack[LoadOptions],
 ) -> Robot:
     import hashlib  # noqa: PLC0415
 
@@ -227,7 +227,7 @@ def _load_usd(
     xacro_args: Mapping[str, object] | None,
     variant: Mapping[str, str],
     articulation: str | None,
-    **how: Unpack[How],
+    **how: Unpack[LoadOptions],
 ) -> Robot:
     import hashlib  # noqa: PLC0415
 
@@ -280,7 +280,7 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
     return read_bytes(at_home(source))
 
 
-def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[How]) -> Robot:
+def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[LoadOptions]) -> Robot:
     from urdfkin.urdf.foreign import tree_of_model  # noqa: PLC0415
     from urdfkin.verify.model_check import check_model_source  # noqa: PLC0415
 

@@ -119,7 +119,7 @@ _TIME_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class TrajectorySamples:
     """The n samples in a file, converted to urdfkin's convention; a missing array is None.
 
     Attributes:
@@ -273,7 +273,7 @@ def read_trajectory(
     return with_rates(robot.tree, read_samples(robot, Path(path), conversion))
 
 
-def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> Samples:
+def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:
     """Read the samples of a file as `read_trajectory` does, but compute no missing velocities."""
     archive = path.suffix.lower() == ".npz"
     data = _arrays(path, conversion or robot) if archive else _table(robot, path, conversion)
@@ -297,10 +297,10 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
         raise InputError("no samples", where=str(path), remedy="write one line for each sample")
     base = BaseMotion(*(data[name] for name in _BASE)) if _BASE[0] in data else None
     t, v, a = (x if x is None else frozen(x) for x in (t, v, a))
-    return Samples(str(path), frozen(q), t, v, a, base)
+    return TrajectorySamples(str(path), frozen(q), t, v, a, base)
 
 
-def with_rates(tree: KinematicTree, x: Samples) -> Trajectory:
+def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     """Return samples as a trajectory; compute v and a by central differences if they are missing.
 
     Too few samples raise InputError.

@@ -73,7 +73,7 @@ class Header(TypedDict):
 
 
 @dataclass(frozen=True, slots=True)
-class Layout(Generic[_T]):
+class DocumentKind(Generic[_T]):
     """A kind of document, for example a certificate.
 
     Attributes:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-from urdfkin.errors import Question
+from urdfkin.errors import QuestionsSection
 
 
 def plain_xml(text: str) -> Element:
@@ -39,4 +39,4 @@ def order_words(urdf: str, joints: Sequence[str]) -> str:
     if first is None:
         return f"{ours_is}; the file has the same order"
     differs = f"{written[first]} is number {first + 1} in the file and {ours[first]} here"
-    return f"{ours_is}; the order in the file differs: {differs}; {Question.JOINT_ORDER}"
+    return f"{ours_is}; the order in the file differs: {differs}; {QuestionsSection.JOINT_ORDER}"

@@ -288,7 +288,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
             _strip(mujoco, spec)
         model = compiled(spec)
         title = spec.modelname or "robot"
-        reader = _Reader(mujoco, model, title, name)
+        reader = _MjcfReader(mujoco, model, title, name)
         tree = reader.tree()
     except UnicodeDecodeError as error:
         raise InputError(
@@ -440,7 +440,7 @@ def _join_names(*names: str) -> str:
 
 
 @dataclass(slots=True)
-class _Reader:
+class _MjcfReader:
     """Convert one compiled model; `source` is its name in messages."""
 
     mujoco: Any

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TypeGuard
 
-from urdfkin.errors import InputError, Question, SourceError, UnknownNameError, nearest
+from urdfkin.errors import InputError, QuestionsSection, SourceError, UnknownNameError, nearest
 from urdfkin.errors.validators import as_bool, as_str, safe_repr
 from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
 from urdfkin.urdf.catalogue import Entry, catalogue, find_package, split_uri
@@ -252,7 +252,7 @@ def _in_package(name: str, path: str) -> Path:
             f"the package {name!r} is not found",
             where=f"package://{name}/{path}",
             remedy="add the folder of the package to ROS_PACKAGE_PATH, or name the file by its path",
-            question=Question.PACKAGES_AND_MESHES,
+            question=QuestionsSection.PACKAGES_AND_MESHES,
         )
     return folder / path
 

@@ -309,7 +309,7 @@ def read_usd(
         }
         if more := sorted(used - {os.path.realpath(file) for file in files}):
             raise _refused("the stage uses a file that none of its layers names", name, more[0])
-        return _Reader(pxr, stage, name, opened).read(articulation, files)
+        return _StageReader(pxr, stage, name, opened).read(articulation, files)
     except pxr.Tf.ErrorException as error:
         words = "; ".join(str(getattr(one, "commentary", one)) for one in error.args)
         found = " ".join(words.split())[:300]
@@ -393,7 +393,7 @@ class _Articulation:
 
 
 @dataclass(slots=True)
-class _Reader:
+class _StageReader:
     """Reader of one stage. `source` is its name in messages, `opened` the paths of expanded instances."""
 
     pxr: Any

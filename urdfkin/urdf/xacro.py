@@ -21,7 +21,7 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
-from urdfkin.errors import Question, SourceError, UnknownNameError, UrdfkinError
+from urdfkin.errors import QuestionsSection, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import read_bytes
 from urdfkin.system.lazy_import import install_remedy
 from urdfkin.system.processes import ask_python, own_python
@@ -116,7 +116,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
             "a .xacro file needs the package xacrodoc",
             where=str(path),
             remedy=f"{install_remedy('xacro')}, or expand the file with: xacro FILE > robot.urdf",
-            question=Question.XACRO,
+            question=QuestionsSection.XACRO,
         )
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
     output, status = ask_python(command, _request(path.absolute(), arguments, patience), patience, MOST)
@@ -138,7 +138,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         found=str(reason).strip() or None,
         remedy="set arguments with --xacro-arg NAME:=VALUE, and the folders of packages in ROS_PACKAGE_PATH;"
         " docs/xacro.md lists the operations that a file may do",
-        question=Question.XACRO,
+        question=QuestionsSection.XACRO,
     )
 
 

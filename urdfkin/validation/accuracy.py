@@ -65,7 +65,7 @@ class Errors:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class AccuracyLine:
     """The errors of urdfkin and of Pinocchio for one quantity in one reference frame.
 
     The reference frame of a placement is None. For analytical Jacobians, `reference` is the representation of
@@ -94,7 +94,7 @@ class Judgement:
     robot: str
     samples: int
     seed: int
-    lines: tuple[Line, ...]
+    lines: tuple[AccuracyLine, ...]
     moving_base: bool = False
 
 
@@ -120,11 +120,11 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
     with precision(max(DIGITS, enough_digits(longest))):
         return Judgement(
-            robot.name, samples, seed, tuple(_Work(robot, drawn, base).lines()), base is not None
+            robot.name, samples, seed, tuple(_AccuracyBatch(robot, drawn, base).lines()), base is not None
         )
 
 
-class _Compared(NamedTuple):
+class _AccuracySamples(NamedTuple):
     """The results of urdfkin and of Pinocchio, the values with 50 digits, and the scale of the errors."""
 
     urdfkin: FloatArray
@@ -133,7 +133,7 @@ class _Compared(NamedTuple):
     scale: FloatArray
 
 
-class _Work:
+class _AccuracyBatch:
     def __init__(self, robot: Robot, x: Samples, base: BaseMotion | None) -> None:
         if base is not None and base.batch_shape not in ((), (len(x.q),)):
             raise InputError(
@@ -156,7 +156,7 @@ class _Work:
             for k in range(len(x.q))
         ]
 
-    def lines(self) -> Iterator[Line]:
+    def lines(self) -> Iterator[AccuracyLine]:
         for reference in (None, *Reference):
             for row in validated():
                 if row.exact is not None and reference in row.references:
@@ -165,13 +165,13 @@ class _Work:
         for name, representations in _REPRESENTATIONS.items():
             yield _line(ANALYTICAL_JACOBIAN.name, name, list(self._analytical(representations)))
 
-    def _compared(self, row: Quantity, reference: Reference | None) -> _Compared:
+    def _compared(self, row: Quantity, reference: Reference | None) -> _AccuracySamples:
         reference = _ALIGNED if reference is None else reference
         query = self.part.query._replace(reference=reference)
         part = self.part._replace(reference=reference, query=query)
         ours, theirs = own_results(row, part), oracle_results(row, self.oracle, query)
         scale = np.broadcast_to(bound_of(row, part).scale, ours.shape)
-        return _Compared(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
+        return _AccuracySamples(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 
     def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
         """Return the values with 50 digits (n, links, ...), in the order of urdfkin's results."""
@@ -180,7 +180,7 @@ class _Work:
             dtype=object,
         )
 
-    def _analytical(self, representations: Sequence[str]) -> Iterator[_Compared]:
+    def _analytical(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
         """Yield the analytical Jacobians of each representation."""
         poses, J_v = self._compared(PLACEMENT, None), self._compared(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part
@@ -203,7 +203,7 @@ class _Work:
             ours = analytical_jacobian(name, R[clear], J_v.urdfkin[clear], 0.0)
             theirs = analytical_jacobian(name, R_theirs[clear], J_v.pinocchio[clear], 0.0)
             ours, theirs, scale = (_columns(J, moving[clear]) for J in (ours, theirs, bound.scale[clear]))
-            yield _Compared(ours, theirs, true, scale)
+            yield _AccuracySamples(ours, theirs, true, scale)
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
@@ -234,7 +234,7 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
     return unit
 
 
-def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -> Line:
+def _line(quantity: str, reference: str | None, compared: Sequence[_AccuracySamples]) -> AccuracyLine:
     sides: tuple[list[FloatArray], list[FloatArray]] = [], []
     for ours, theirs, true, scale in compared:
         counted = scale > 0.0
@@ -242,7 +242,7 @@ def _line(quantity: str, reference: str | None, compared: Sequence[_Compared]) -
         for errors, side in zip(sides, (ours, theirs), strict=True):
             errors.append(_error(side[counted], true[counted]) / units)
     own_errors, their_errors = map(np.concatenate, sides)
-    return Line(quantity, reference, len(own_errors), _errors(own_errors), _errors(their_errors))
+    return AccuracyLine(quantity, reference, len(own_errors), _errors(own_errors), _errors(their_errors))
 
 
 @partial(np.vectorize, otypes=[float])

@@ -22,7 +22,7 @@ from urdfkin.system.documents import as_data, typed
 from urdfkin.urdf.lint import UrdfError
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.error_stats import Key, Tally
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary, entries_of
 
@@ -39,7 +39,7 @@ class Failure:
             stored, so that a resumed run computes the chunk again.
     """
 
-    verdict: Verdict
+    verdict: ValidationVerdict
     reason: str
     portrait: RobotSummary = NO_PORTRAIT
     error: str | None = None
@@ -59,12 +59,14 @@ def answer(chunk: Chunk) -> Answer:
 
 def failure(subject: RobotInput, error: Exception) -> Failure:
     if isinstance(error, UrdfError):
-        return Failure(Verdict.BAD_INPUT, str(error), RobotSummary(findings=entries_of(error.findings)))
+        return Failure(
+            ValidationVerdict.BAD_INPUT, str(error), RobotSummary(findings=entries_of(error.findings))
+        )
     if isinstance(error, OracleError):
-        return Failure(Verdict.NOT_VERIFIED, str(error), _portrait(subject))
+        return Failure(ValidationVerdict.NOT_VERIFIED, str(error), _portrait(subject))
     if isinstance(error, UrdfkinError):
-        return Failure(Verdict.BAD_INPUT, str(error), _portrait(subject))
-    return Failure(Verdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error))
+        return Failure(ValidationVerdict.BAD_INPUT, str(error), _portrait(subject))
+    return Failure(ValidationVerdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error))
 
 
 def unexpected_error(error: Exception) -> str:

@@ -26,7 +26,7 @@ from urdfkin.validation.chunk import Cut
 from urdfkin.validation.collector import Progress, ResultCollector
 from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
 from urdfkin.validation.manifest import Manifest
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport, ValidationReport
 from urdfkin.validation.robot_input import Given, RobotInput, subjects
 from urdfkin.validation.store import Store, opened
@@ -151,10 +151,12 @@ def validate(
         except KeyboardInterrupt:
             interrupted = True
         except UrdfkinError as error:
-            collector.give_up(Failure(Verdict.NOT_VERIFIED, str(error)))
+            collector.give_up(Failure(ValidationVerdict.NOT_VERIFIED, str(error)))
         except Exception as error:  # finished results stay in the report
             collector.give_up(
-                Failure(Verdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error))
+                Failure(
+                    ValidationVerdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error)
+                )
             )
     reports = tuple(collector.reports())
     return ValidationReport(

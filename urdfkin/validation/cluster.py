@@ -115,7 +115,7 @@ class _Scheduler(_Portless, Scheduler):
     pass
 
 
-class _Worker(_Portless, Worker):
+class _ClusterWorker(_Portless, Worker):
     pass
 
 
@@ -135,7 +135,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
             dask.config.set({"temporary-directory": scratch}),
             SpecCluster(
                 scheduler={"cls": _Scheduler, "options": here},
-                workers={place: {"cls": _Worker, "options": local} for place in range(number)},
+                workers={place: {"cls": _ClusterWorker, "options": local} for place in range(number)},
                 silence_logs=logging.ERROR,
             ) as cluster,
         ):

@@ -15,7 +15,7 @@ from urdfkin.validation.answer import Answer, Failure
 from urdfkin.validation.chunk import ChunkResult, Cut
 from urdfkin.validation.engines import Task
 from urdfkin.validation.error_stats import Key, Tally, plus
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
@@ -61,7 +61,7 @@ class ResultCollector:
         progress: Progress | None = None,
     ) -> None:
         self._subjects, self._cut, self._progress = subjects, cut, progress
-        self._robots = [_Robot(part) for part in parts]
+        self._robots = [_RobotAnswers(part) for part in parts]
         self._chunks = sum(map(len, parts))
         self._chunks_done = self._from_earlier = self._robots_done = self._failures = 0
 
@@ -113,7 +113,7 @@ class ResultCollector:
                 yield robot.report(subject, self._cut.configurations(robot.part))
 
 
-class _Robot:
+class _RobotAnswers:
     def __init__(self, part: range) -> None:
         self.part = part
         self.failures: dict[int, Failure] = {}
@@ -186,18 +186,18 @@ class _Robot:
 
 def _verdict(
     tallies: dict[Key, Tally], portrait: RobotSummary, failure: Failure | None, samples: int, wanted: int
-) -> tuple[Verdict, list[str]]:
+) -> tuple[ValidationVerdict, list[str]]:
     """Return the verdict on a robot and all reasons for it; a disagreement takes precedence."""
     disagreements = [*_outside(tallies), *portrait.disagreements]
-    verdict, reasons = Verdict.VERIFIED, list[str]()
+    verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:
         verdict, reasons = failure.verdict, [failure.reason]
     elif samples < wanted:
-        verdict = Verdict.NOT_VERIFIED
+        verdict = ValidationVerdict.NOT_VERIFIED
         reasons = [f"interrupted: {samples:,} of {wanted:,} samples were compared"]
     elif not any(tally.results for tally in tallies.values()):
-        verdict, reasons = Verdict.NOT_VERIFIED, ["nothing was compared"]
-    return (Verdict.DISAGREES if disagreements else verdict), disagreements + reasons
+        verdict, reasons = ValidationVerdict.NOT_VERIFIED, ["nothing was compared"]
+    return (ValidationVerdict.DISAGREES if disagreements else verdict), disagreements + reasons
 
 
 def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:

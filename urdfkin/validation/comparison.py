@@ -83,7 +83,7 @@ def blocks(count: int, size: int) -> Iterator[slice]:
         yield slice(start, min(count, start + most))
 
 
-class _Work:
+class _ComparisonBatch:
     def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> None:
         self.robot, self.oracle, self.x, self.first, self.clock = robot, oracle, x, first_sample, clock
         rows = zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True)
@@ -93,7 +93,7 @@ class _Work:
         return tally(ours, theirs, bound, names, self.first, self.inputs)
 
 
-class _Block(_Work):
+class _Block(_ComparisonBatch):
     """The comparisons for a block of frames, and for each joint whose child link is in the block."""
 
     def __init__(
@@ -157,7 +157,7 @@ class _Block(_Work):
         return (row.name, reference.name.lower() if reference is not None else ""), found
 
 
-class _Screws(_Work):
+class _Screws(_ComparisonBatch):
     """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
 
     Each column of `data.J` belongs to one joint. It equals a column of this joint's Jacobian in the reference

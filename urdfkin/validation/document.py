@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NotRequired, TypedDict
 
-from urdfkin.system.documents import Count, Header, Layout, Matrix, Sha256, Size, of_length, says
-from urdfkin.validation.outcome import OUTCOMES, Outcome, outcome
+from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Sha256, Size, of_length, says
+from urdfkin.validation.outcome import OUTCOMES, RunOutcome, outcome
 
 Units = Annotated[
     Size | None,
@@ -16,7 +16,7 @@ Units = Annotated[
 ]
 
 
-class Limit(TypedDict):
+class ReportedLimit(TypedDict):
     """Limits of a joint; null: no limit."""
 
     lower: Annotated[float | None, says("Lower position limit, rad or m; null: no limit.")]
@@ -25,7 +25,7 @@ class Limit(TypedDict):
     effort: Annotated[float | None, says("Limit of the joint torque or force, N m or N; null: no limit.")]
 
 
-class Mimic(TypedDict):
+class ReportedMimic(TypedDict):
     """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
 
     leader: Annotated[str, says("Name of the mimicked joint.")]
@@ -48,7 +48,7 @@ class Kept(TypedDict):
     by: Annotated[list[str], says("Names of the mimic joints that reduce the joint's range.")]
 
 
-class Joint(TypedDict):
+class ReportedJoint(TypedDict):
     """A joint. Fixed joints are included."""
 
     name: Annotated[str, says("Name of the joint in the URDF.")]
@@ -76,8 +76,8 @@ class Joint(TypedDict):
     v: Annotated[
         int | None, says("Index of the joint's first entry in v and in a. null: the joint has no coordinate.")
     ]
-    limit: Annotated[Limit | None, says("The joint's limits; null: the joint has no limits.")]
-    mimic: Annotated[Mimic | None, says("The rule of a mimic joint; null for other joints.")]
+    limit: Annotated[ReportedLimit | None, says("The joint's limits; null: the joint has no limits.")]
+    mimic: Annotated[ReportedMimic | None, says("The rule of a mimic joint; null for other joints.")]
     kept: Annotated[
         Kept | None,
         says(
@@ -93,7 +93,7 @@ class Joint(TypedDict):
     ]
 
 
-class Model(TypedDict):
+class ReportedModel(TypedDict):
     """Links and joints of the robot, in Pinocchio's order."""
 
     name: Annotated[str, says("The robot's name.")]
@@ -119,11 +119,11 @@ class Model(TypedDict):
     frames: Annotated[list[str], says("Names of all links and joints, as in Pinocchio.")]
     links: Annotated[list[str], says("Names of all links; links[i + 1] is the child of joints[i].")]
     joints: Annotated[
-        list[Joint], says("All joints. The parent link of a joint comes before its child link.")
+        list[ReportedJoint], says("All joints. The parent link of a joint comes before its child link.")
     ]
 
 
-class Finding(TypedDict):
+class ReportedFinding(TypedDict):
     """A finding in the URDF file, as `urdfkin check` reports it."""
 
     code: Annotated[
@@ -154,7 +154,7 @@ class Finding(TypedDict):
     ]
 
 
-class Row(TypedDict):
+class ReportedDHRow(TypedDict):
     """The constant parameters of a row of a Denavit-Hartenberg table, in metres and radians."""
 
     joint: Annotated[str, says("Name of the joint.")]
@@ -181,10 +181,10 @@ class Row(TypedDict):
     sense: Annotated[Literal[1, -1], says("Sign of the joint's value in d or theta.")]
 
 
-class Table(TypedDict):
+class ReportedDHTable(TypedDict):
     """A table in one convention."""
 
-    rows: Annotated[list[Row], says("Rows of the table from base to tip.")]
+    rows: Annotated[list[ReportedDHRow], says("Rows of the table from base to tip.")]
     base: Matrix
     tool: Matrix
 
@@ -195,8 +195,8 @@ class Chain(TypedDict):
     limb: Annotated[str | None, says("Name of the limb in the catalogue; null: none.")]
     base: Annotated[str, says("Name of the chain's base frame.")]
     tip: Annotated[str, says("Name of the chain's tip frame.")]
-    standard: Table
-    modified: Table
+    standard: ReportedDHTable
+    modified: ReportedDHTable
     samples: Annotated[
         Count,
         says("Number of configurations at which both tables were compared with Pinocchio; 0: no comparison."),
@@ -224,7 +224,7 @@ class Chain(TypedDict):
     ]
 
 
-class Errors(TypedDict):
+class ReportedErrors(TypedDict):
     """Errors of one library relative to values with fifty digits, in eps * scale."""
 
     worst: Annotated[float, says("Largest error of all values, in eps * scale.")]
@@ -243,11 +243,11 @@ class Judged(TypedDict):
         ),
     ]
     numbers: Annotated[Count, says("Number of values compared with fifty-digit values.")]
-    urdfkin: Errors
-    pinocchio: Errors
+    urdfkin: ReportedErrors
+    pinocchio: ReportedErrors
 
 
-class Judgement(TypedDict):
+class ReportedAccuracy(TypedDict):
     """Result of the accuracy study: errors of urdfkin and Pinocchio relative to values with fifty digits."""
 
     robot: Annotated[str, says("The robot's name.")]
@@ -275,7 +275,7 @@ class Case(TypedDict):
     replay: Annotated[str, says("Command that reproduces the disagreement.")]
 
 
-class Pair(TypedDict):
+class ReportedOraclePair(TypedDict):
     """Comparison of urdfkin or Pinocchio with the second oracle."""
 
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
@@ -301,15 +301,15 @@ class SecondOracle(TypedDict):
     """Comparison of the same results with a second oracle. Without a second oracle, this entry is missing."""
 
     by: Annotated[str, says("Name of the second oracle: mujoco.")]
-    urdfkin: Pair
-    pinocchio: Pair
+    urdfkin: ReportedOraclePair
+    pinocchio: ReportedOraclePair
     alone: Alone
     undecided: Annotated[
         Count, says("Number of results in which all three libraries differ from each other.")
     ]
 
 
-class Check(TypedDict):
+class ReportedCheck(TypedDict):
     """Comparison of one quantity with Pinocchio in one reference frame."""
 
     quantity: Annotated[str, says("Name of the quantity: placement, velocity, jacobian, ...")]
@@ -377,7 +377,7 @@ class Timings(TypedDict):
     ]
 
 
-class SecondReading(TypedDict):
+class ReportedSecondReading(TypedDict):
     """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
 
     by: Annotated[str, says("Name and version of the second reader.")]
@@ -389,7 +389,7 @@ class SecondReading(TypedDict):
     unread: Annotated[str | None, says("Reason why the second reader cannot read the text; null if it can.")]
 
 
-class Robot(TypedDict):
+class ReportedRobot(TypedDict):
     """Report of one robot."""
 
     source: Annotated[
@@ -410,17 +410,19 @@ class Robot(TypedDict):
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     seconds: Annotated[float, says("Computing time of this robot, seconds.")]
     timings: Annotated[Timings | None, says("Computing times of the parts of the validation; null: unknown.")]
-    model: Annotated[Model | None, says("Links and joints of the robot; null if the file could not be read.")]
-    findings: Annotated[list[Finding], says("Findings of the linter in the robot's file.")]
+    model: Annotated[
+        ReportedModel | None, says("Links and joints of the robot; null if the file could not be read.")
+    ]
+    findings: Annotated[list[ReportedFinding], says("Findings of the linter in the robot's file.")]
     chains: Annotated[list[Chain], says("Chains of the robot with their Denavit-Hartenberg tables.")]
     second_reader: Annotated[
-        SecondReading | None,
+        ReportedSecondReading | None,
         says("Comparison with the tree that yourdfpy reads from the same text; null: no comparison."),
     ]
     checks: Annotated[
-        list[Check], says("Comparisons with Pinocchio, one for each quantity and reference frame.")
+        list[ReportedCheck], says("Comparisons with Pinocchio, one for each quantity and reference frame.")
     ]
-    judge: Annotated[Judgement | None, says("Result of the accuracy study; null without `--judge`.")]
+    judge: Annotated[ReportedAccuracy | None, says("Result of the accuracy study; null without `--judge`.")]
 
 
 class Document(Header):
@@ -442,11 +444,11 @@ class Document(Header):
     reason: Annotated[
         str | None, says("Reason why the validation has not passed, in one line; null if it has passed.")
     ]
-    robots: Annotated[list[Robot], says("Reports of the robots in the requested order.")]
+    robots: Annotated[list[ReportedRobot], says("Reports of the robots in the requested order.")]
 
 
 #: Layout of the document; entries may be added, but none is removed or changes its meaning.
-VALIDATION = Layout(
+VALIDATION = DocumentKind(
     "urdfkin-validation/1",
     Document,
     tuple(OUTCOMES.values()),
@@ -455,7 +457,7 @@ VALIDATION = Layout(
 )
 
 
-def outcome_of(document: Document) -> Outcome:
+def outcome_of(document: Document) -> RunOutcome:
     """Return the outcome of the run, which follows from the verdicts of all robots."""
     verdicts = [robot["verdict"] for robot in document["robots"]]
     return outcome(verdicts, document["asked"], document["interrupted"])

@@ -19,11 +19,11 @@ from typing import Protocol
 
 from urdfkin.validation.answer import Answer, Failure, answer
 from urdfkin.validation.chunk import Chunk
-from urdfkin.validation.outcome import Verdict
+from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import RobotInput
 
 
-class Row:
+class RobotTasks:
     """The remaining tasks of a robot.
 
     Attributes:
@@ -53,12 +53,12 @@ class WorkQueue:
     """Distribute tasks among workers; if `shared`, several workers may work on the same robot."""
 
     def __init__(self, work: Work, *, shared: bool = True) -> None:
-        self._waiting: Iterator[Row] = map(Row, work)
+        self._waiting: Iterator[RobotTasks] = map(RobotTasks, work)
         self._shared = shared
-        self._begun: list[Row] = []
+        self._begun: list[RobotTasks] = []
         self._ended = set[int]()
 
-    def first(self) -> tuple[Task, Row] | None:
+    def first(self) -> tuple[Task, RobotTasks] | None:
         """Return a task for an idle worker, preferably of a new robot, and the robot's other tasks."""
         for row in self._waiting:
             self._begun.append(row)
@@ -69,7 +69,7 @@ class WorkQueue:
                 return task, row
         return None
 
-    def next(self, row: Row) -> Task | None:
+    def next(self, row: RobotTasks) -> Task | None:
         """Return the next task of a robot; None if no task is left, or if the robot was removed."""
         task = next(row, None)
         if task is None or task.robot in self._ended:
@@ -78,7 +78,7 @@ class WorkQueue:
             return None
         return task
 
-    def put_back(self, task: Task, row: Row) -> None:
+    def put_back(self, task: Task, row: RobotTasks) -> None:
         """Put a task back into its robot's remaining tasks, so that another worker can run it."""
         row.put_back(task)
         self._begun.remove(row)
@@ -178,7 +178,7 @@ def _result(future: Future[Answer]) -> Answer:
 
 def lost(what: str, error: Exception) -> Failure:
     message = " ".join(str(error).split()) or "no message"
-    return Failure(Verdict.NOT_VERIFIED, f"{what}: {type(error).__name__}: {message}", passing=True)
+    return Failure(ValidationVerdict.NOT_VERIFIED, f"{what}: {type(error).__name__}: {message}", passing=True)
 
 
 #: Reasons in the report for a robot that crashed its process.
@@ -187,4 +187,4 @@ DIED_TWICE = "the process that validated the robot crashed twice; the second pro
 
 
 def died(subject: RobotInput, how: str, cause: str) -> Failure:
-    return Failure(Verdict.NOT_VERIFIED, f"{subject.label}: {how}: found {cause}")
+    return Failure(ValidationVerdict.NOT_VERIFIED, f"{subject.label}: {how}: found {cause}")

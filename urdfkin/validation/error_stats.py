@@ -26,7 +26,7 @@ SIDES = ("urdfkin", "pinocchio", "second_oracle")
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class OraclePair:
     """Comparison of one library's results with the results of the second oracle.
 
     Attributes:
@@ -40,8 +40,8 @@ class Pair:
     worst: float = 0.0
     share_of_bound: float = 0.0
 
-    def __add__(self, other: Pair) -> Pair:
-        return Pair(
+    def __add__(self, other: OraclePair) -> OraclePair:
+        return OraclePair(
             self.failed + other.failed,
             max(self.worst, other.worst),
             max(self.share_of_bound, other.share_of_bound),
@@ -62,8 +62,8 @@ class ThreeSides:
     """
 
     by: str
-    urdfkin: Pair
-    pinocchio: Pair
+    urdfkin: OraclePair
+    pinocchio: OraclePair
     alone: tuple[int, int, int] = (0, 0, 0)
     undecided: int = 0
 
@@ -94,7 +94,7 @@ def three_sides(
     urdfkin and the second oracle.
     """
     if not ours.size:
-        return ThreeSides(by, Pair(), Pair())
+        return ThreeSides(by, OraclePair(), OraclePair())
     both = _together(first, second)
     own, units_own = _shares(ours, second_oracles, second)
     other, units_other = _shares(pinocchios, second_oracles, both)
@@ -109,8 +109,8 @@ def three_sides(
     first_alone, second_alone, third_alone = (int(one.sum()) for one in alone)
     return ThreeSides(
         by,
-        Pair(int((~ours_second).sum()), float(units_own.max()), float(own.max())),
-        Pair(int((~theirs_second).sum()), float(units_other.max()), float(other.max())),
+        OraclePair(int((~ours_second).sum()), float(units_own.max()), float(own.max())),
+        OraclePair(int((~theirs_second).sum()), float(units_other.max()), float(other.max())),
         (first_alone, second_alone, third_alone),
         int((~settled).sum()),
     )

@@ -325,7 +325,7 @@ def verify_function(
 
 
 @dataclass
-class _Compared:
+class _FunctionResults:
     """The results of the user's function and of urdfkin at some configurations.
 
     Attributes:
@@ -435,7 +435,9 @@ class _Run:
             found = self._method(self.robot, ours, frame or self.frame, reference, verify=False)
             return self._converted(ours, found, frame, reference)
 
-    def _compared(self, first: int, drawn: tuple[FloatArray, ...], total: _Total, checked: bool) -> _Compared:
+    def _compared(
+        self, first: int, drawn: tuple[FloatArray, ...], total: _Total, checked: bool
+    ) -> _FunctionResults:
         row = self.row
         ours = drawn[: len(row.inputs)]
         result = self._method(self.recording, ours, self.frame, None, verify=checked)
@@ -459,7 +461,7 @@ class _Run:
         found, good = self._called(inputs, expected.shape[1:], first, total)
         if theirs is not None:
             theirs = self._converted(ours, np.asarray(theirs)[:, 0])[good]
-        return _Compared(first, inputs, good, found, expected[good], scale[good], k[good], theirs)
+        return _FunctionResults(first, inputs, good, found, expected[good], scale[good], k[good], theirs)
 
     def _method(
         self,
@@ -608,7 +610,7 @@ class _Total:
     wrong_shapes: set[tuple[int, ...]] = field(default_factory=set)
     shape: tuple[int, ...] = ()
     worst: WorstResult | None = None
-    kept: _Compared | None = None
+    kept: _FunctionResults | None = None
 
     def __post_init__(self) -> None:
         self.by_row, self.by_column = np.zeros(len(self.row_names)), np.zeros(len(self.column_names))
@@ -618,7 +620,7 @@ class _Total:
         if len(self.first_errors) < _KEPT:
             self.first_errors.append(FunctionError(sample, message))
 
-    def add(self, part: _Compared) -> None:
+    def add(self, part: _FunctionResults) -> None:
         self.shape = part.expected.shape[1:]
         if not part.good:
             return

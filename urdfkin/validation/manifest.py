@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from urdfkin.system.documents import Layout, as_data, parse_json
+from urdfkin.system.documents import DocumentKind, as_data, parse_json
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.chunk import Cut
 from urdfkin.validation.results import provenance
@@ -75,7 +75,7 @@ class Manifest:
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
         """Read a manifest; raise InputError for a file that is no manifest, or has another layout."""
-        layout = Layout(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
+        layout = DocumentKind(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
         return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Verdict(StrEnum):
+class ValidationVerdict(StrEnum):
     """Result of the validation of a robot; worse results come first."""
 
     BAD_INPUT = "bad input"
@@ -26,22 +26,22 @@ DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 INTERRUPTED = 130
 #: Verdicts of a failed run, in words for one robot and for several robots.
 _WORDS = {
-    Verdict.DISAGREES: ("disagrees", "disagree"),
-    Verdict.NOT_VERIFIED: ("is not verified", "are not verified"),
-    Verdict.BAD_INPUT: ("has bad input", "have bad input"),
+    ValidationVerdict.DISAGREES: ("disagrees", "disagree"),
+    ValidationVerdict.NOT_VERIFIED: ("is not verified", "are not verified"),
+    ValidationVerdict.BAD_INPUT: ("has bad input", "have bad input"),
 }
 #: Verdict of a run for each exit code.
 OUTCOMES = {
-    0: Verdict.VERIFIED.value,
-    DISAGREEMENT: Verdict.DISAGREES.value,
+    0: ValidationVerdict.VERIFIED.value,
+    DISAGREEMENT: ValidationVerdict.DISAGREES.value,
     INTERRUPTED: "interrupted",
-    INPUT: Verdict.BAD_INPUT.value,
-    UNCHECKED: Verdict.NOT_VERIFIED.value,
+    INPUT: ValidationVerdict.BAD_INPUT.value,
+    UNCHECKED: ValidationVerdict.NOT_VERIFIED.value,
 }
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class RunOutcome:
     """The outcome of a validation run.
 
     Attributes:
@@ -65,7 +65,7 @@ class Outcome:
         return self.reason is None
 
 
-def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> Outcome:
+def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> RunOutcome:
     """Return the outcome of a run with `asked` requested robots.
 
     >>> outcome(["verified", "disagrees"], asked=3, interrupted=False)
@@ -85,15 +85,15 @@ def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> Outcome:
         reasons.append(f"{asked - sum(counts.values())} of {_robots(asked)} without a report")
     if not asked:
         reasons.append("no robot was validated")
-    return Outcome(_exit_code(counts, interrupted, bool(reasons)), ", ".join(reasons) or None)
+    return RunOutcome(_exit_code(counts, interrupted, bool(reasons)), ", ".join(reasons) or None)
 
 
 def _exit_code(counts: Counter[str], interrupted: bool, failed: bool) -> int:
-    if counts[Verdict.DISAGREES]:
+    if counts[ValidationVerdict.DISAGREES]:
         return DISAGREEMENT
     if interrupted:
         return INTERRUPTED
-    if counts[Verdict.BAD_INPUT]:
+    if counts[ValidationVerdict.BAD_INPUT]:
         return INPUT
     return UNCHECKED if failed else 0
 

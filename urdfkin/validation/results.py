@@ -22,7 +22,7 @@ from urdfkin.urdf.catalogue import examples
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.document import VALIDATION, Document
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally, WorstCase
-from urdfkin.validation.outcome import Outcome, Verdict, outcome
+from urdfkin.validation.outcome import RunOutcome, ValidationVerdict, outcome
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
 from urdfkin.validation.timings import Clock
 from urdfkin.verify.oracles import ORACLES, version, versions
@@ -72,7 +72,7 @@ class RobotReport:
 
     origin: Origin
     name: str
-    verdict: Verdict
+    verdict: ValidationVerdict
     reason: str | None
     joints: tuple[str, ...]
     frames: tuple[str, ...]
@@ -214,7 +214,7 @@ class ValidationReport(Displayable):
             worst, share = (max((getattr(x, of) for x in tallies), default=0.0) for of in ("worst", "share"))
             figures = (f"{worst:.2g}", f"{share:.1%}") if tallies else ("", "")
             rows.append((robot.source, robot.verdict.value, str(robot.results), str(robot.failed), *figures))
-        verified = sum(robot.verdict is Verdict.VERIFIED for robot in self.robots)
+        verified = sum(robot.verdict is ValidationVerdict.VERIFIED for robot in self.robots)
         samples = f"{self.samples} samples of each robot, seed {self.seed}, in {self.seconds:.1f} s."
         reasons = [f"{robot.source}: {robot.reason}" for robot in self.robots if robot.reason]
         return TextDocument(
@@ -235,7 +235,7 @@ class ValidationReport(Displayable):
         )
 
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> RunOutcome:
         """The outcome of the run, with the reason if it has not passed."""
         return outcome((robot.verdict for robot in self.robots), self.asked, self.interrupted)
 

@@ -24,14 +24,14 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.lint import Finding
-from urdfkin.validation.document import Chain, Model, Row, SecondReading
-from urdfkin.validation.document import Finding as FindingEntry
+from urdfkin.validation.document import Chain, ReportedDHRow, ReportedModel, ReportedSecondReading
+from urdfkin.validation.document import ReportedFinding as FindingEntry
 from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.second_reader import second_reading
 from urdfkin.verify.tables import check_table
 
 
-def describe(robot: Robot) -> Model:
+def describe(robot: Robot) -> ReportedModel:
     """Return plain data for JSON: coordinates, frames, and every joint with its placement, axis and limits.
 
     >>> import urdfkin
@@ -58,7 +58,7 @@ def describe(robot: Robot) -> Model:
         "links": robot.link_names,
         "joints": [_joint(robot, i, narrowed) for i in range(len(tree.joints))],
     }
-    return cast("Model", plain(data))
+    return cast("ReportedModel", plain(data))
 
 
 def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str, Any]:
@@ -127,7 +127,9 @@ def _chains(robot: Robot) -> Iterator[tuple[str | None, str, str]]:
 def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable]) -> dict[str, Any]:
     data: dict[str, Any] = {
         name: {
-            "rows": [{entry: getattr(row, entry) for entry in Row.__annotations__} for row in table.rows],
+            "rows": [
+                {entry: getattr(row, entry) for entry in ReportedDHRow.__annotations__} for row in table.rows
+            ],
             "base": table.base,
             "tool": table.tool,
         }
@@ -154,10 +156,10 @@ class RobotSummary:
         second_reader: The comparison with yourdfpy's tree of the same text; None: not compared.
     """
 
-    model: Model | None = None
+    model: ReportedModel | None = None
     findings: tuple[FindingEntry, ...] = ()
     chains: tuple[Chain, ...] = ()
-    second_reader: SecondReading | None = None
+    second_reader: ReportedSecondReading | None = None
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
@@ -188,7 +190,7 @@ def chain_disagreement(chain: Chain) -> str | None:
     )
 
 
-def reader_disagreement(reading: SecondReading) -> str | None:
+def reader_disagreement(reading: ReportedSecondReading) -> str | None:
     """Describe how yourdfpy's tree differs from urdfkin's; None if they are equal or were not compared."""
     if not reading["differences"]:
         return None

@@ -28,7 +28,7 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
-from urdfkin.system.documents import Count, Layout, Sha256, Size, of_length, says
+from urdfkin.system.documents import Count, DocumentKind, Sha256, Size, of_length, says
 from urdfkin.system.files import MOST_DATA, read_bytes, read_text, write_file
 from urdfkin.system.lazy_import import lazy_import
 from urdfkin.system.resources import robots_dir
@@ -157,7 +157,7 @@ class Vectors(TypedDict):
     samples: list[Sample]
 
 
-VECTORS = Layout("urdfkin-vectors/1", Vectors, (), "urdfkin vectors write DIR")
+VECTORS = DocumentKind("urdfkin-vectors/1", Vectors, (), "urdfkin vectors write DIR")
 
 
 # -- the robots -----------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from typing import cast
 from urdfkin.system.processes import own_python
 from urdfkin.validation.answer import Answer, Failure, answer
 from urdfkin.validation.chunk import Chunk
-from urdfkin.validation.engines import DIED, DIED_TWICE, Enter, Row, Task, Work, WorkQueue, died, lost
+from urdfkin.validation.engines import DIED, DIED_TWICE, Enter, RobotTasks, Task, Work, WorkQueue, died, lost
 
 #: Module with the function `serve`, which a process runs.
 WORKER = "urdfkin.validation.worker_processes"
@@ -146,7 +146,7 @@ class _Crew:
     def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
         self._jobs, self._enter, self._alone = jobs, enter, alone
         self._queue = WorkQueue(work, shared=alone is None)
-        self._workers: list[_Worker] = []
+        self._workers: list[_WorkerProcess] = []
         #: Unanswered tasks of each robot that crashed a worker.
         self.to_retry: dict[int, list[Task]] = {}
 
@@ -182,19 +182,19 @@ class _Crew:
                 continue
             self._give(worker, task, row)
 
-    def _start(self) -> _Worker:
-        worker = _Worker()
+    def _start(self) -> _WorkerProcess:
+        worker = _WorkerProcess()
         self._workers.append(worker)
         return worker
 
-    def _give(self, worker: _Worker, task: Task, row: Row) -> None:
+    def _give(self, worker: _WorkerProcess, task: Task, row: RobotTasks) -> None:
         worker.task, worker.row = task, row
         try:
             worker.connection.send(task.chunk)
         except OSError:
             self._handle_crash(worker, task)
 
-    def _take(self, worker: _Worker, task: Task) -> None:
+    def _take(self, worker: _WorkerProcess, task: Task) -> None:
         try:
             found: Answer = worker.connection.recv()
         except (EOFError, OSError):
@@ -216,7 +216,7 @@ class _Crew:
             self.to_retry.pop(task.robot, None)
         self._enter(task, found)
 
-    def _handle_crash(self, worker: _Worker, task: Task) -> None:
+    def _handle_crash(self, worker: _WorkerProcess, task: Task) -> None:
         """Schedule the tasks of the worker's robot for a second try, or report the crash."""
         self._workers.remove(worker)
         cause = worker.cause()
@@ -226,10 +226,10 @@ class _Crew:
             self._enter_answer(task, died(task.chunk.subject, self._alone, cause))
 
 
-class _Worker(WorkerProcess):
+class _WorkerProcess(WorkerProcess):
     """A worker process, its current task, and the remaining tasks of the robot that it works on."""
 
     def __init__(self) -> None:
         super().__init__()
         self.task: Task | None = None
-        self.row = Row(())
+        self.row = RobotTasks(())

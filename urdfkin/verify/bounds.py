@@ -50,7 +50,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.compiled import preload
-from urdfkin.compiled.plan import Column, CompiledTree, Geometry, Motion, Step
+from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry, JointMotion, StepField
 from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.lengths import State
 from urdfkin.kinematics.number_kinds import Length, counted, norm, product
@@ -144,7 +144,7 @@ def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out
     free = [
         x
         for link in links
-        if link.kind >= Motion.PLANAR
+        if link.kind >= JointMotion.PLANAR
         for x in _free_lengths(link, *(x.T for x in (q, v, a)))
     ]
     kernel(
@@ -165,7 +165,7 @@ def _rows(columns: Sequence[FloatArray]) -> FloatArray:
     return rows
 
 
-class _Link(NamedTuple):
+class _MovingJoint(NamedTuple):
     """A moving joint of a compiled tree.
 
     `multiplier` and `constant` are the absolute values of the joint's mimic multiplier and mimic offset.
@@ -195,7 +195,7 @@ class _End(NamedTuple):
 class _Lengths(NamedTuple):
     """The moving joints and the frames of a compiled tree, as Python numbers and as NumPy arrays."""
 
-    links: list[_Link]
+    links: list[_MovingJoint]
     ends: list[_End]
     tables: tuple[NDArray[Any], ...]
 
@@ -208,7 +208,7 @@ def _lengths(plan: CompiledTree) -> _Lengths:
         rules = np.abs(plan.geometry[:, Geometry.MULTIPLIER :]).tolist()
         steps = zip(plan.steps.tolist(), plan.parents.tolist(), lengths[:count], rules, strict=True)
         links = [
-            _Link(kind, q, v, parent, length, multiplier, float(counted(constant)))
+            _MovingJoint(kind, q, v, parent, length, multiplier, float(counted(constant)))
             for (kind, q, v), parent, length, (multiplier, constant) in steps
         ]
         frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
@@ -238,22 +238,22 @@ def _carried_place(state: State, d: Length) -> State:
 
 
 #: Numbers of translations and of rotations of a planar joint and of a floating joint.
-_FREE_PARTS = {int(Motion.PLANAR): (2, 1), int(Motion.FLOATING): (3, 3)}
+_FREE_PARTS = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
-def _displacement(link: _Link, q: Any) -> Length:
+def _displacement(link: _MovingJoint, q: Any) -> Length:
     """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
-    if link.kind != Motion.SLIDE:
+    if link.kind != JointMotion.SLIDE:
         return _norm(q[link.q : link.q + _FREE_PARTS[link.kind][0]])
     return product(link.multiplier, abs(q[link.q])) + link.constant
 
 
-def _place(link: _Link, state: State, q: Any) -> State:
-    turns = link.kind == Motion.TURN
+def _place(link: _MovingJoint, state: State, q: Any) -> State:
+    turns = link.kind == JointMotion.TURN
     return _carried_place(state, link.length if turns else link.length + _displacement(link, q))
 
 
-def _free_lengths(link: _Link, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
+def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
     """Return the lengths of a planar or floating joint's displacement, velocities and accelerations."""
     at, (slides, turns) = link.v, _FREE_PARTS[link.kind]
     (u, o), (u_rate, o_rate) = (
@@ -262,13 +262,13 @@ def _free_lengths(link: _Link, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
     return _displacement(link, q), o, u, o_rate, u_rate
 
 
-def _step(link: _Link, state: State, q: Any, v: Any, a: Any) -> State:
+def _step(link: _MovingJoint, state: State, q: Any, v: Any, a: Any) -> State:
     kind, d, at = link.kind, link.length, link.v
-    if kind >= Motion.PLANAR:
+    if kind >= JointMotion.PLANAR:
         slid, *rates = _free_lengths(link, q, v, a)
         return steps.freed(state, d + slid, *rates)
     rate, rate_2 = product(link.multiplier, abs(v[at])), product(link.multiplier, abs(a[at]))
-    if kind == Motion.SLIDE:
+    if kind == JointMotion.SLIDE:
         return steps.slid(state, d + _displacement(link, q), rate, rate_2)
     return steps.turned(state, d, rate, rate_2)
 
@@ -337,7 +337,7 @@ def about_the_root(size: Magnitudes) -> Magnitudes:
     )
 
 
-class Conversion(NamedTuple):
+class DecimalErrors(NamedTuple):
     """The errors of converting a URDF's decimals to doubles (`urdfkin.verify.exact.numbers.conversion`).
 
     Attributes:
@@ -354,7 +354,7 @@ class Conversion(NamedTuple):
 
 
 def against_true_values(
-    plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: Conversion
+    plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: DecimalErrors
 ) -> Magnitudes:
     """Return the magnitudes for a comparison of one program's results with the true values.
 
@@ -558,8 +558,8 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     (near, near_mixed), (far, far_mixed) = _PAIR_TERMS[reference]
-    step, rate = plan.columns[:, Column.STEP], plan.columns[:, Column.V]
-    turns, size_of = plan.columns[:, Column.TURNS] == 1, np.abs(plan.multipliers)
+    step, rate = plan.columns[:, ColumnField.STEP], plan.columns[:, ColumnField.V]
+    turns, size_of = plan.columns[:, ColumnField.TURNS] == 1, np.abs(plan.multipliers)
     for f, (_, place) in enumerate(plan.frames):
         own = np.flatnonzero(plan.leaders[f] >= 0)
         i, j = own[:, np.newaxis], own[np.newaxis, :]
@@ -660,8 +660,8 @@ def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     weights = np.zeros((2, len(plan.frames), plan.nv))
     for f, (_, place) in enumerate(plan.frames):
         for c in np.flatnonzero(plan.leaders[f] >= 0):
-            kind = 0 if plan.columns[c, Column.TURNS] else 1
-            weights[kind, place, plan.columns[c, Column.V]] += abs(plan.multipliers[c])
+            kind = 0 if plan.columns[c, ColumnField.TURNS] else 1
+            weights[kind, place, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
     weights.setflags(write=False)
     return weights[0], weights[1]
 
@@ -675,7 +675,10 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
     path between these points has no length and no prismatic joint.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
-    turns, multipliers = plan.steps[:, Step.KIND] == Motion.TURN, plan.geometry[:, Geometry.MULTIPLIER :]
+    turns, multipliers = (
+        plan.steps[:, StepField.KIND] == JointMotion.TURN,
+        plan.geometry[:, Geometry.MULTIPLIER :],
+    )
     extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
     for f, (end, place) in enumerate(plan.frames):
         path, step = list[int](), int(end)  # the path leads from the frame to the root
@@ -689,9 +692,9 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
         has_lever = dict(zip(path, levers, strict=False))
         for c in np.flatnonzero((plan.leaders[f] >= 0) & (plan.multipliers != 0.0)):
             column = plan.columns[c]
-            own = found[place, :, column[Column.V]]
-            own[:3] |= not column[Column.TURNS] or has_lever[column[Column.STEP]]
-            own[3:] |= column[Column.TURNS] == 1
+            own = found[place, :, column[ColumnField.V]]
+            own[:3] |= not column[ColumnField.TURNS] or has_lever[column[ColumnField.STEP]]
+            own[3:] |= column[ColumnField.TURNS] == 1
     return found
 
 

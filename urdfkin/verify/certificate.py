@@ -16,7 +16,7 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import json_text, log_line
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.documents import Count, Header, Layout, Size, plain, says
+from urdfkin.system.documents import Count, DocumentKind, Header, Size, plain, says
 from urdfkin.system.files import at_home, write_file
 from urdfkin.system.locks import lock_over_forks
 from urdfkin.verify.bounds import Bound, result_k
@@ -78,7 +78,7 @@ class VerificationError(UrdfkinError):
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class BatchComparison:
     """Comparison of a batch of urdfkin's results (matrices or six-vectors) with the oracle's results.
 
     Attributes:
@@ -93,11 +93,11 @@ class Comparison:
     index: tuple[int, ...]
 
     @classmethod
-    def of_nothing(cls) -> Comparison:
+    def of_nothing(cls) -> BatchComparison:
         """Return the comparison of an empty batch, which agrees."""
         return cls(0, 0.0, 0.0, ())
 
-    def __add__(self, other: Comparison) -> Comparison:
+    def __add__(self, other: BatchComparison) -> BatchComparison:
         """Combine the comparisons of two batches.
 
         The `index` is the index from the batch with the larger ratio `share`. A ratio of NaN counts as larger
@@ -105,7 +105,7 @@ class Comparison:
         """
         second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
         first, second = (other, self) if second_is_larger else (self, other)
-        return Comparison(
+        return BatchComparison(
             self.results + other.results,
             float(np.maximum(self.worst, other.worst)),
             first.share,
@@ -118,7 +118,7 @@ class Comparison:
         return self.share <= 1.0
 
 
-def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Comparison:
+def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:
     """Compare results of urdfkin and of the oracle; the first `axes` axes are not axes of one result.
 
     For placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
@@ -126,17 +126,17 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Co
     return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
 
 
-def comparison_of(units: FloatArray, bound: Bound) -> Comparison:
+def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
     """Compare the largest difference of each result, in multiples of eps * scale, with the result's bound."""
     if not units.size:
-        return Comparison.of_nothing()
+        return BatchComparison.of_nothing()
     share = units / result_k(bound, units.shape)
     index = np.unravel_index(int(share.argmax()), share.shape)
-    return Comparison(units.size, float(units.max()), float(share.max()), tuple(int(i) for i in index))
+    return BatchComparison(units.size, float(units.max()), float(share.max()), tuple(int(i) for i in index))
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class CertificateLine:
     """The line of a certificate about one quantity.
 
     Attributes:
@@ -184,7 +184,7 @@ class CertificateDocument(Header):
     ]
 
 
-CERTIFICATE = Layout(
+CERTIFICATE = DocumentKind(
     "urdfkin-certificate/1",
     CertificateDocument,
     ("verified", "not verified"),
@@ -216,7 +216,7 @@ class Certificate(Displayable):
 
     robot: str
     oracle: str
-    lines: tuple[Line, ...]
+    lines: tuple[CertificateLine, ...]
     not_verified: tuple[str, ...]
     reading: str = ""
     source: str = ""
@@ -319,7 +319,7 @@ class Account:
             unchecked results that the evaluator has returned.
     """
 
-    checked: Comparison = field(default_factory=Comparison.of_nothing)
+    checked: BatchComparison = field(default_factory=BatchComparison.of_nothing)
     unchecked: int = 0
     not_asked_for: int = 0
     counters: list[tuple[IntArray, int]] = field(default_factory=list)
@@ -329,9 +329,11 @@ class Account:
         """Number of results of calls with verify=False, including the results of fast evaluators."""
         return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
-    def line(self, quantity: str) -> Line:
+    def line(self, quantity: str) -> CertificateLine:
         found = self.checked
-        return Line(quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted)
+        return CertificateLine(
+            quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted
+        )
 
 
 @dataclass
@@ -348,7 +350,7 @@ class Ledger:
         with _entering:
             return self._accounts.setdefault(quantity, Account())
 
-    def checked(self, quantity: str, comparison: Comparison) -> None:
+    def checked(self, quantity: str, comparison: BatchComparison) -> None:
         account = self.account(quantity)
         with _entering:
             account.checked += comparison

@@ -22,7 +22,7 @@ from urdfkin.compiled.machine.compiling import (
     kernel,
 )
 from urdfkin.compiled.machine.memory import fetch, numbers_at
-from urdfkin.compiled.plan import Motion
+from urdfkin.compiled.plan import JointMotion
 from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.arithmetic import bound, rebound
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
@@ -166,7 +166,7 @@ def coupling(full, columns, index, factor, out):
 
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
-_TURN, _SLIDE = int(Motion.TURN), int(Motion.SLIDE)
+_TURN, _SLIDE = int(JointMotion.TURN), int(JointMotion.SLIDE)
 #: Number of values in the state of a link, and in the array `free` for each planar or floating joint.
 _STATE = _FREE = 5
 

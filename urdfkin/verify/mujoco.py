@@ -67,7 +67,7 @@ class _Joint:
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
+class _MujocoIndices:
     """Indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
 
     The joints of a moving base have the indices q = v = -1, because they are not in urdfkin's q and v. A
@@ -163,7 +163,7 @@ class MujocoOracle(Oracle):
 
     def _laid_out(
         self, joints: Sequence[_Joint], rules: Mapping[str, Mimic], held: Mapping[str, float]
-    ) -> Iterator[_Place]:
+    ) -> Iterator[_MujocoIndices]:
         leaders, q, v = dict[str, tuple[int, int]](), 0, 0
         for joint in joints:
             sizes = _SIZES[joint.kind]
@@ -177,7 +177,7 @@ class MujocoOracle(Oracle):
             own = self._model.joint(f"j{i} {first}" if first else f"j{i}")
             if joint.name in held:
                 their = int(own.qposadr[0]), int(own.dofadr[0])
-                yield _Place(joint.kind, *their, 0, -1, 0.0, held[joint.name])
+                yield _MujocoIndices(joint.kind, *their, 0, -1, 0.0, held[joint.name])
                 continue
             rule = rules.get(joint.name, Mimic(joint.name, 1.0, 0.0))
             if joint.name and rule.leader not in leaders:
@@ -185,7 +185,7 @@ class MujocoOracle(Oracle):
                     "the mimicked joint does not exist", where=f"joint {joint.name}", found=rule.leader
                 )
             at = leaders.get(rule.leader, (-1, -1))  # the motion of the base is not part of q
-            yield _Place(
+            yield _MujocoIndices(
                 joint.kind, int(own.qposadr[0]), int(own.dofadr[0]), *at, rule.multiplier, rule.offset
             )
 
@@ -368,7 +368,7 @@ class MujocoOracle(Oracle):
                 S_rate[:, at : at + slides, own : own + slides] = R @ crossed[:, :slides, :slides]
         return S_rate
 
-    def _turn(self, place: _Place, q: FloatArray) -> tuple[FloatArray, int]:
+    def _turn(self, place: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
         """Return the rotation (n, 3, 3) or (n, 2, 2) of a floating or planar joint, and its slide count."""
         own = q[:, place.q : place.q + 7]
         if place.kind == "floating":

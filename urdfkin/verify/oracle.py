@@ -9,7 +9,7 @@ therefore leads to a disagreement.
 |---|---|---|
 | mimic rules | `rules_of_text` | `urdfkin.urdf.lint`, `urdfkin.urdf.reader` |
 | names, batch shapes | `OracleQuery` | `urdfkin.verify.call` |
-| order of q, v and a | `Layout` | `KinematicTree` |
+| order of q, v and a | `PinocchioLayout` | `KinematicTree` |
 | frame of a name | `Frames` | `KinematicTree.frame_link` |
 | moving base | `free_flyer` and others | `BaseMotion` |
 
@@ -116,7 +116,7 @@ _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
-class _Place(NamedTuple):
+class _JointIndices(NamedTuple):
     """First index of a joint's coordinates, first index of its joint velocities, and its mimic rule.
 
     `full_q` and `full_v` are the indices in Pinocchio's vectors, `q` and `v` those in urdfkin's. `sizes` is
@@ -132,7 +132,7 @@ class _Place(NamedTuple):
     offset: float
 
 
-class Layout:
+class PinocchioLayout:
     """Convert q, v and a to Pinocchio's vectors, and Pinocchio's Jacobian columns to urdfkin's.
 
     Args:
@@ -158,7 +158,7 @@ class Layout:
             if name not in rules:
                 at[name] = self.nq, self.nv
                 self.nq, self.nv = self.nq + _COORDINATES[own], self.nv + own[1]
-        self._places = list[_Place]()
+        self._places = list[_JointIndices]()
         for j, name, own in zip(joints, names, sizes, strict=True):
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
             if rule.leader not in at:
@@ -166,7 +166,7 @@ class Layout:
                     "Pinocchio has no such mimicked joint", where=f"joint {name}", found=repr(rule.leader)
                 )
             full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
-            self._places.append(_Place(own, *full, *at[rule.leader], rule.multiplier, rule.offset))
+            self._places.append(_JointIndices(own, *full, *at[rule.leader], rule.multiplier, rule.offset))
         self.rate_columns = [place.full_v + c for place in self._places for c in range(place.sizes[1])]
         self._index, self._factor = self._rates()
         self._columns = np.array(self.rate_columns, dtype=np.int64)

@@ -25,13 +25,13 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.errors import InstallationError, OracleError, Question
+from urdfkin.errors import InstallationError, OracleError, QuestionsSection
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.processes import with_stack
 from urdfkin.verify.oracle import (
-    Layout,
     Oracle,
+    PinocchioLayout,
     QueryBatch,
     frames_of,
     free_flyer,
@@ -93,7 +93,7 @@ def _impostor(found: Any) -> InstallationError:
         where=str(file),
         found=what,
         remedy=f"Pinocchio's package is called pin: {cure}; pip install {_WANTED}",
-        question=Question.WRONG_PINOCCHIO,
+        question=QuestionsSection.WRONG_PINOCCHIO,
     )
 
 
@@ -224,7 +224,7 @@ class PinocchioOracle(Oracle):
         joints, self._index = list(range(1, len(names) + 1)), list(range(self._model.nframes))
         if self.moving_base:
             joints, self._index = self._put_on_free_flyer(joints)
-        self._layout = Layout(self._model, joints, names, self.rules(names))
+        self._layout = PinocchioLayout(self._model, joints, names, self.rules(names))
         self._joint_ids = dict(zip(names, joints, strict=True))
         self.new_data = self._model.createData
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from urdfkin.errors import Question, UnknownNameError
+from urdfkin.errors import QuestionsSection, UnknownNameError
 from urdfkin.system.lazy_import import lazy_import
 
 if TYPE_CHECKING:
@@ -276,7 +276,7 @@ ACCELERATION = Quantity(
     page="Second derivative of the position of the frame's origin, m/s^2, and angular acceleration, rad/s^2,"
     " for joint velocities --v and joint accelerations --a. Gravity is not included. --breakdown lists the"
     " transverse, centripetal, Coriolis and sliding contribution of each joint (eq. 7.125)."
-    f" {Question.TWO_ACCELERATIONS}, {Question.GRAVITY}.",
+    f" {QuestionsSection.TWO_ACCELERATIONS}, {QuestionsSection.GRAVITY}.",
     example="urdfkin acceleration panda --q random --v random --a random --breakdown",
 )
 ANALYTICAL_JACOBIAN = replace(

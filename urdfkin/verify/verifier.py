@@ -27,8 +27,8 @@ from urdfkin.verify import bounds
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import (
+    BatchComparison,
     Certificate,
-    Comparison,
     Ledger,
     VerificationError,
     compare,
@@ -218,7 +218,7 @@ class Verifier:
             ledger.unchecked(quantity.name, call.results, reason)
             return
         results = call.question.flat(result, quantity.axes)
-        total, worst = Comparison.of_nothing(), None
+        total, worst = BatchComparison.of_nothing(), None
         for part in parts(wanted, call.n, results[:1].size):
             comparison, failure = self._compare(quantity, call, results[part], part)
             if failure is not None and (worst is None or comparison.share > total.share):
@@ -272,7 +272,7 @@ class Verifier:
 
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
-    ) -> tuple[Comparison, VerificationError | None]:
+    ) -> tuple[BatchComparison, VerificationError | None]:
         """Compare some of urdfkin's results with the oracle's; also return an error beyond the bound."""
         x = call.part(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
@@ -384,7 +384,7 @@ class Verifier:
 
 def comparison_with_oracle(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
-) -> Comparison:
+) -> BatchComparison:
     """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
 
     Large results are compared in blocks, while the oracle's results are still in the cache. OracleError is

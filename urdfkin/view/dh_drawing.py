@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.table import DHConvention, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.tree import FloatArray
 from urdfkin.view.figure import BLUE, ORANGE, VERMILION, label, new_figure, style
@@ -132,7 +132,7 @@ def row_corners(table: DHTable, frames: FloatArray) -> FloatArray:
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
         # In the standard convention, the offset d comes before the length a.
-        if table.convention is Convention.STANDARD:
+        if table.convention is DHConvention.STANDARD:
             x, z = frames[i + 1, :3, 0], frames[i + 1, :3, 2]
             normal = math.cos(row.beta) * x + math.sin(row.beta) * z
             corners[i] = frames[i + 1, :3, 3] - row.a * normal
@@ -142,7 +142,7 @@ def row_corners(table: DHTable, frames: FloatArray) -> FloatArray:
 
 
 def _draw(canvas: _Canvas, table: DHTable, frames: FloatArray, tip: FloatArray) -> None:
-    size, standard = canvas.size, table.convention is Convention.STANDARD
+    size, standard = canvas.size, table.convention is DHConvention.STANDARD
     for i, (row, corner) in enumerate(zip(table.rows, row_corners(table, frames), strict=True)):
         first, second = (_D, _A) if standard else (_A, _D)
         canvas.line(frames[i, :3, 3], corner, color=first, linewidth=2.6)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled.breakdown import KINDS
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.table import DHConvention, DHTable
 from urdfkin.errors.escape import printable
 from urdfkin.kinematics.rotation import quaternion_of
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -355,7 +355,7 @@ class Stage:
             return
         frames = T_world_base @ table.frames(q)
         starts, middles, ends = frames[:-1, :3, 3], row_corners(table, frames), frames[1:, :3, 3]
-        standard = table.convention is Convention.STANDARD
+        standard = table.convention is DHConvention.STANDARD
         first, second = (_OFFSET, _NORMAL) if standard else (_NORMAL, _OFFSET)
         self._dh.append(
             self._scene.add_batched_axes(

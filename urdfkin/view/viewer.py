@@ -54,7 +54,7 @@ _MOST_MISSING = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class SliderRow:
     """Description of one slider, which sets one number of q, v or a.
 
     Attributes:
@@ -77,7 +77,7 @@ class Sliders:
     """
 
     def __init__(
-        self, gui: Any, folder: Any, rows: Iterable[Row], rate: str, moved: Callable[[int, float], None]
+        self, gui: Any, folder: Any, rows: Iterable[SliderRow], rate: str, moved: Callable[[int, float], None]
     ) -> None:
         self._gui, self._folder, self.rows, self._rate, self._moved = gui, folder, list(rows), rate, moved
         self._setting = False
@@ -94,7 +94,7 @@ class Sliders:
                 for row, order in zip(self.rows, orders, strict=True)
             ]
 
-    def _slider(self, row: Row, value: float, order: float | None) -> Any:
+    def _slider(self, row: SliderRow, value: float, order: float | None) -> Any:
         scale = self._scale(row)
         lower, upper = self._range(row, value)
         unit = ("deg" if self._degrees else "rad") if row.turns else "m"
@@ -111,7 +111,7 @@ class Sliders:
         handle.on_update(lambda _: self._report(row, handle))
         return handle
 
-    def _report(self, row: Row, handle: Any) -> None:
+    def _report(self, row: SliderRow, handle: Any) -> None:
         if not self._setting:
             self._moved(row.at, float(handle.value) / self._scale(row))
 
@@ -134,10 +134,10 @@ class Sliders:
         finally:
             self._setting = False
 
-    def _scale(self, row: Row) -> float:
+    def _scale(self, row: SliderRow) -> float:
         return math.degrees(1.0) if row.turns and self._degrees else 1.0
 
-    def _step(self, row: Row, width: float) -> float:
+    def _step(self, row: SliderRow, width: float) -> float:
         if row.turns:
             return _DEGREES if self._degrees else _RADIANS
         size = width / _STEPS
@@ -145,7 +145,7 @@ class Sliders:
         return next(power * digit for digit in (5.0, 2.0, 1.0) if power * digit <= size * (1.0 + 1e-9))
 
     @staticmethod
-    def _range(row: Row, value: float) -> tuple[float, float]:
+    def _range(row: SliderRow, value: float) -> tuple[float, float]:
         return min(row.lower, value), max(row.upper, value)
 
 
@@ -154,7 +154,7 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
     return (lower, first), (upper, last)
 
 
-def coordinate_rows(robot: Robot) -> list[Row]:
+def coordinate_rows(robot: Robot) -> list[SliderRow]:
     """Describe a slider within the joint's limits for each coordinate that can change, but no quaternion."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
@@ -162,7 +162,7 @@ def coordinate_rows(robot: Robot) -> list[Row]:
             turns = _turns(joint, k)
             lower, upper = _limits(joint, math.pi if turns else 1.0)
             if upper > lower:
-                rows.append(Row(at + k, robot.coordinate_names[at + k], turns, lower, upper))
+                rows.append(SliderRow(at + k, robot.coordinate_names[at + k], turns, lower, upper))
     return rows
 
 
@@ -171,7 +171,7 @@ def fixed_coordinates(robot: Robot) -> list[str]:
     return [robot.coordinate_names[i] for i in np.flatnonzero(lower == upper)]
 
 
-def rate_rows(robot: Robot, *, second: bool) -> list[Row]:
+def rate_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
     """Describe a slider for each joint velocity, or for each joint acceleration if `second` is true."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
@@ -180,7 +180,7 @@ def rate_rows(robot: Robot, *, second: bool) -> list[Row]:
             if not second and joint.limit is not None and 0.0 < joint.limit.velocity < _FAR:
                 most = joint.limit.velocity
             turns = k >= 3 if joint.nv == 6 else _turns(joint, k)
-            rows.append(Row(at + k, robot.rate_names[at + k], turns, -most, most))
+            rows.append(SliderRow(at + k, robot.rate_names[at + k], turns, -most, most))
     return rows
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from urdfkin.dh.common_normals import demand_squares_of
 from urdfkin.dh.compare.fit import (
     CELLS,
-    Model,
+    TableArrays,
     TargetPoses,
     as_written,
     columns,
@@ -26,11 +26,11 @@ from urdfkin.dh.compare.fit import (
     fitted_model,
     hidden_cells,
 )
-from urdfkin.dh.compare.mistakes import Search
-from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, Comparison
+from urdfkin.dh.compare.mistakes import MistakeSearch
+from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, TableComparison
 from urdfkin.dh.convert import free_tree, link_names, to_convention
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.dh.table import Convention, DHTable
+from urdfkin.dh.table import DHConvention, DHTable
 from urdfkin.errors import InputError
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.configuration import values_within
@@ -67,7 +67,7 @@ def compare(
     *,
     fit: bool = True,
     digits: Digits = (),
-) -> Comparison:
+) -> TableComparison:
     """Compare a reference table with a path of a URDF.
 
     Args:
@@ -83,7 +83,7 @@ def compare(
         InputError: the joints of the table differ in number or kind from those of the path.
     """
     check_joints(chain, reference)
-    standard = to_convention(reference, Convention.STANDARD)
+    standard = to_convention(reference, DHConvention.STANDARD)
     tried, judged = _target_poses(chain)
     written = as_written(standard)
     fitted = fitted_model(chain, standard, written, tried) if fit else written
@@ -94,7 +94,7 @@ def compare(
     cells = _differences(chain, reference, fitted, complete, judged, digits, fit)
     table = _fitted_table(chain, standard, fitted)
     most_metres, most_radians = max_tip_error_bound(chain, table, _slides(chain))
-    found = Comparison(
+    found = TableComparison(
         reference=table,
         reach=tried.scale,
         fitted=fit,
@@ -119,7 +119,9 @@ def compare(
     if found.as_written:
         return found
     enough = tolerance if found.agrees else max(tolerance, _LEFT * found.metres)
-    if mistakes := Search(chain, tried, judged, enough).mistakes(reference, fit=fit, agrees=found.agrees):
+    if mistakes := MistakeSearch(chain, tried, judged, enough).mistakes(
+        reference, fit=fit, agrees=found.agrees
+    ):
         cells = tuple(one.cell for one in mistakes if one.cell is not None)
         blamed = cells if len(mistakes) == 1 else ()
         return replace(found, mistakes=mistakes, differences=blamed)
@@ -136,7 +138,7 @@ def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[floa
     error `enough` (metres). If the joints differ in number or kind, InputError is raised.
     """
     check_joints(chain, reference)
-    standard = to_convention(reference, Convention.STANDARD)
+    standard = to_convention(reference, DHConvention.STANDARD)
     tried, judged = _target_poses(chain)
     return judged.apart(fitted_model(chain, standard, as_written(standard), tried, enough, hasty=True))
 
@@ -196,7 +198,7 @@ def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
     }
 
 
-def _offsets(standard: DHTable, fitted: Model) -> tuple[float, ...]:
+def _offsets(standard: DHTable, fitted: TableArrays) -> tuple[float, ...]:
     offsets = []
     for i, row in enumerate(standard.rows):
         k = fitted.own(i)
@@ -216,7 +218,7 @@ def _cell_at(reference: DHTable, i: int, cell: str) -> int:
     In a modified table, a, alpha and beta are in row i + 1. If no row contains the cell, the result is the
     number of rows.
     """
-    return i + (reference.convention is Convention.MODIFIED and cell not in ("theta", "d"))
+    return i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
 
 
 def _cells_of(reference: DHTable) -> FloatArray:
@@ -225,7 +227,7 @@ def _cells_of(reference: DHTable) -> FloatArray:
     return np.array([[float(_cell_at(reference, i, cell) < n) for cell in CELLS] for i in range(n)])
 
 
-def _hidden(reference: DHTable, fitted: Model, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
+def _hidden(reference: DHTable, fitted: TableArrays, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
     """Return the cells that have the same effect as base, tool or joint offsets; a beta of 0 is left out."""
     found = [
         (_cell_at(reference, i, CELLS[k]), CELLS[k])
@@ -238,8 +240,8 @@ def _hidden(reference: DHTable, fitted: Model, judged: TargetPoses) -> tuple[tup
 def _differences(
     chain: FrameChain,
     reference: DHTable,
-    fitted: Model,
-    complete: Model,
+    fitted: TableArrays,
+    complete: TableArrays,
     judged: TargetPoses,
     digits: Digits,
     free: bool,
@@ -266,8 +268,8 @@ def _differences(
 def _instead(
     chain: FrameChain,
     reference: DHTable,
-    written: Model,
-    found: Comparison,
+    written: TableArrays,
+    found: TableComparison,
     wanted: tuple[TargetPoses, TargetPoses],
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
@@ -284,7 +286,7 @@ def _instead(
     return cells if len(cells) <= len(found.differences) + 2 else ()
 
 
-def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTable:
+def _fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> DHTable:
     """Return the fitted reference table, with the joint names and limits of the URDF."""
     rows = []
     for i, (row, joint) in enumerate(zip(standard.rows, chain.joints, strict=True)):
@@ -293,7 +295,7 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: Model) -> DHTabl
         sense = int(fitted.senses[i])
         rows.append(replace(row, theta=theta, d=d, sense=sense, joint=joint.name, **of_joint))
     ends = fitted.base, fitted.tool, chain.robot, chain.base, chain.tip
-    return DHTable(Convention.STANDARD, tuple(rows), *ends)
+    return DHTable(DHConvention.STANDARD, tuple(rows), *ends)
 
 
 def max_tip_error_bound(

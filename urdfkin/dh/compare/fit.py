@@ -32,19 +32,25 @@ from functools import cached_property
 
 import numpy as np
 
-from urdfkin.dh.common_normals import FAR_FEET, NEARLY_PARALLEL, NearParallel, Step, step_between
+from urdfkin.dh.common_normals import FAR_FEET, NEARLY_PARALLEL, AxisTransform, NearParallel, step_between
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHRow, DHTable, along_axis, between_axes
 from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_a_fit
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
-from urdfkin.model.path import Motion, Path
+from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, pose
 
 #: The cells have the order of their transforms in a row, which `_ROW` contains.
 CELLS = ("theta", "d", "a", "alpha", "beta")
-_ROW = (Motion(2, True), Motion(2, False), Motion(0, False), Motion(0, True), Motion(1, True))
+_ROW = (
+    ElementaryMotion(2, True),
+    ElementaryMotion(2, False),
+    ElementaryMotion(0, False),
+    ElementaryMotion(0, True),
+    ElementaryMotion(1, True),
+)
 #: The step of the fit is limited, in radians for angles, and in metres per metre of reach for lengths.
 LONGEST_STEP = 0.5
 #: The fit of the cells ends after `_ROUNDS` steps.
@@ -69,7 +75,7 @@ _HIDDEN = 1e-6
 
 
 @dataclass(frozen=True)
-class Model:
+class TableArrays:
     """The numbers of a standard table, as arrays for a fit.
 
     Attributes:
@@ -105,7 +111,7 @@ class Model:
         return 0 if self.turns[i] else 1
 
     @property
-    def _motions(self) -> tuple[Motion, ...]:
+    def _motions(self) -> tuple[ElementaryMotion, ...]:
         return _ROW * len(self.cells)
 
     def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
@@ -138,7 +144,7 @@ class TargetPoses:
     poses: FloatArray
     scale: float
 
-    def apart(self, model: Model) -> tuple[float, float]:
+    def apart(self, model: TableArrays) -> tuple[float, float]:
         """Return the largest errors of a model's tip on the samples, in metres and in radians."""
         poses = model.poses(self.values)
         metres = np.linalg.norm(poses[:, :3, 3] - self.poses[:, :3, 3], axis=-1).max()
@@ -151,7 +157,7 @@ class TargetPoses:
 
 
 def columns(
-    model: Model, wanted: TargetPoses, frames: FloatArray | None = None
+    model: TableArrays, wanted: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the tip's poses, and their derivatives by the free parameters and by the cells, as twists.
 
@@ -188,7 +194,7 @@ def _end(poses: FloatArray, at: FloatArray, scale: float) -> FloatArray:
     return out.reshape(-1, 6)
 
 
-def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: bool) -> Model:
+def fit_cells(model: TableArrays, wanted: TargetPoses, cells_of: FloatArray, *, free: bool) -> TableArrays:
     """Fit the table to the URDF with the fewest and smallest changes of cells.
 
     `cells_of` is an (n, 5) mask: 1 for cells that may change, 0 for all other cells. With `free`, base, tool
@@ -215,7 +221,12 @@ def fit_cells(model: Model, wanted: TargetPoses, cells_of: FloatArray, *, free: 
 
 
 def _sparse(
-    model: Model, start: Model, freedoms: FloatArray, cells: FloatArray, error: FloatArray, scale: float
+    model: TableArrays,
+    start: TableArrays,
+    freedoms: FloatArray,
+    cells: FloatArray,
+    error: FloatArray,
+    scale: float,
 ) -> FloatArray:
     """Return the changes of cells that remove the error which remains after the fit of the free parameters.
 
@@ -245,7 +256,7 @@ def _span(freedoms: FloatArray) -> FloatArray:
     return np.linalg.qr(freedoms)[0] if freedoms.any() else np.zeros((len(freedoms), 0))
 
 
-def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
+def hidden_cells(model: TableArrays, wanted: TargetPoses) -> list[tuple[int, int]]:
     """Return (row, cell index) of each cell whose value cannot be determined from the tip's poses.
 
     For such a cell, some change of the free parameters has the same effect on the tip as a change of the
@@ -258,7 +269,9 @@ def hidden_cells(model: Model, wanted: TargetPoses) -> list[tuple[int, int]]:
     return [(int(one) // len(CELLS), int(one) % len(CELLS)) for one in seen]
 
 
-def moved(model: Model, free: FloatArray, scale: float, change: FloatArray | None = None) -> Model:
+def moved(
+    model: TableArrays, free: FloatArray, scale: float, change: FloatArray | None = None
+) -> TableArrays:
     """Return the model after small changes of its free parameters and cells.
 
     All changes are in metres: changes of angles are multiplied by `scale`.
@@ -295,8 +308,8 @@ _TWICE_AS_GOOD = 0.5
 _TURNS = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
 
 
-def as_written(standard: DHTable) -> Model:
-    return Model(
+def as_written(standard: DHTable) -> TableArrays:
+    return TableArrays(
         np.array([(row.theta, row.d, row.a, row.alpha, row.beta) for row in standard.rows]),
         np.array([float(row.kind.turns) for row in standard.rows]),
         np.array([float(row.sense) for row in standard.rows]),
@@ -308,19 +321,19 @@ def as_written(standard: DHTable) -> Model:
 def fitted_model(
     chain: FrameChain,
     standard: DHTable,
-    written: Model,
+    written: TableArrays,
     wanted: TargetPoses,
     enough: float = 0.0,
     *,
     hasty: bool = False,
-) -> Model:
+) -> TableArrays:
     """Return the best of several fits.
 
     The fits start from the written table, and from tables with other joint signs. Other joint signs are used
     only if they halve the error.
     """
 
-    def size(model: Model) -> float:
+    def size(model: TableArrays) -> float:
         metres, radians = wanted.apart(model)
         return metres + wanted.scale * radians
 
@@ -339,7 +352,7 @@ def fitted_model(
     return ends_gathered(best, written)
 
 
-def ends_gathered(model: Model, written: Model) -> Model:
+def ends_gathered(model: TableArrays, written: TableArrays) -> TableArrays:
     """Move the fitted offset of the first joint into the base, and of the last joint into the tool."""
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
@@ -357,14 +370,14 @@ def ends_gathered(model: Model, written: Model) -> Model:
     return replace(model, cells=cells, base=np.asarray(base), tool=np.asarray(tool))
 
 
-def starts(chain: FrameChain, standard: DHTable, written: Model, *effort: int) -> Iterator[Model]:
+def starts(chain: FrameChain, standard: DHTable, written: TableArrays, *effort: int) -> Iterator[TableArrays]:
     """Yield the table as it is written, then the table with each likely combination of joint signs."""
     yield written
     for aligned in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         yield _start(standard, aligned)
 
 
-def _start(standard: DHTable, aligned: Alignment) -> Model:
+def _start(standard: DHTable, aligned: SignedFit) -> TableArrays:
     senses = np.array(aligned.senses, dtype=np.float64)
     start = replace(as_written(standard), senses=senses, base=aligned.base, tool=aligned.tool)
     for i, offset in enumerate(aligned.offsets):
@@ -372,7 +385,7 @@ def _start(standard: DHTable, aligned: Alignment) -> Model:
     return start
 
 
-def fit_freedoms(model: Model, wanted: TargetPoses, *, turns: bool, ends: bool = False) -> Model:
+def fit_freedoms(model: TableArrays, wanted: TargetPoses, *, turns: bool, ends: bool = False) -> TableArrays:
     """Fit base, tool and offsets, or with `ends` only base and tool.
 
     With `turns`, `_opposite_rotations` is called when the error no longer decreases.
@@ -388,17 +401,17 @@ def fit_freedoms(model: Model, wanted: TargetPoses, *, turns: bool, ends: bool =
     return model
 
 
-def _size(model: Model, wanted: TargetPoses) -> float:
+def _size(model: TableArrays, wanted: TargetPoses) -> float:
     return float(np.linalg.norm(wanted.errors(model.poses(wanted.values))))
 
 
-def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, float]:
-    def residuals(model: Model) -> tuple[FloatArray, FloatArray]:
+def _descend(model: TableArrays, wanted: TargetPoses, ends: bool) -> tuple[TableArrays, float]:
+    def residuals(model: TableArrays) -> tuple[FloatArray, FloatArray]:
         path, amounts = model.path_at(wanted.values)
         frames = path.frames(amounts)
         return wanted.errors(frames[..., -1, :, :]), frames
 
-    def derivatives(model: Model, frames: FloatArray) -> FloatArray:
+    def derivatives(model: TableArrays, frames: FloatArray) -> FloatArray:
         return columns(model, wanted, frames)[1][:, : 12 if ends else None]
 
     return least_squares(
@@ -411,7 +424,7 @@ def _descend(model: Model, wanted: TargetPoses, ends: bool) -> tuple[Model, floa
     )
 
 
-def _opposite_rotations(model: Model) -> list[Model]:
+def _opposite_rotations(model: TableArrays) -> list[TableArrays]:
     """Return models with an angle added to one joint offset and subtracted from the next joint offset.
 
     If the axes of the two joints nearly coincide, this change has little effect on the tip.
@@ -445,7 +458,7 @@ _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
-class Alignment:
+class SignedFit:
     """A combination of joint signs, with the joint offsets, the base and the tool that belong to these signs.
 
     Attributes:
@@ -493,7 +506,7 @@ class _Partial:
     absorber: tuple[int, float] | None = None
 
 
-def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[Alignment]:
+def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[SignedFit]:
     """Return the joint signs with which the table of a path is closest to a reference table.
 
     The reference table must be standard and have the same kinds of joints. With prismatic joints, several
@@ -568,7 +581,7 @@ def _extend(
     return found
 
 
-def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, float] | None:
+def _absorber(partial: _Partial, step: AxisTransform, i: int, turns: bool) -> tuple[int, float] | None:
     if not step.free:
         return None
     sign = math.copysign(1.0, math.cos(step.alpha))
@@ -577,7 +590,7 @@ def _absorber(partial: _Partial, step: Step, i: int, turns: bool) -> tuple[int, 
     return None if partial.absorber is None else (partial.absorber[0], sign * partial.absorber[1])
 
 
-def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
+def _absorb(partial: _Partial, step: AxisTransform, theta: float) -> _Partial:
     """Set theta of a prismatic joint to theta in the reference table.
 
     The joint offset of the row in `partial.absorber` changes by the difference between the old and the new
@@ -597,8 +610,8 @@ def _absorb(partial: _Partial, step: Step, theta: float) -> _Partial:
 
 def _steps(
     A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, placed: bool
-) -> Iterator[Step]:
-    """Yield the possible transforms (`Step`) between two axes, with both directions of x.
+) -> Iterator[AxisTransform]:
+    """Yield the possible transforms (`AxisTransform`) between two axes, with both directions of x.
 
     If the axes are nearly parallel in the URDF and in the reference table, the function yields the transform
     of a Hayati row. The x axis of this row is at the offset d of the reference table. If the distance of the
@@ -625,7 +638,7 @@ def _steps(
         yield replace(step.turned(), free=step.free)
 
 
-def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Alignment:
+def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> SignedFit:
     n = len(reference.rows)
     last = reference.rows[-1]
     start = _pose(chain, 0, 1, best.senses[0]) @ best.base
@@ -633,7 +646,7 @@ def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> Align
     if n == 1:
         start, rest = start @ along_axis(-last.theta, -last.d), _pose(chain, 1, best.senses[0], 1)
     tool = np.asarray(np.linalg.solve(last.X, rest), np.float64)
-    return Alignment(best.senses, (*best.offsets, 0.0), start, tool, best.cost)
+    return SignedFit(best.senses, (*best.offsets, 0.0), start, tool, best.cost)
 
 
 def _apart(first: float, second: float) -> float:

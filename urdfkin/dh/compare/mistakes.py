@@ -2,9 +2,9 @@
 
 If a cell of a table has a wrong sign, the table often agrees with the URDF after a fit. The fit changes base,
 tool, joint offsets and joint signs so that they compensate for the wrong sign. After the correction of the
-sign, the table agrees even if fewer parameters are fitted. Usually, no parameter must be fitted. `Search`
-therefore tries each single change of the table. The likely mistakes are the changes after which the fewest
-parameters must be fitted.
+sign, the table agrees even if fewer parameters are fitted. Usually, no parameter must be fitted.
+`MistakeSearch` therefore tries each single change of the table. The likely mistakes are the changes after
+which the fewest parameters must be fitted.
 """
 
 from __future__ import annotations
@@ -17,11 +17,19 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.compare.fit import HASTY, Model, TargetPoses, as_written, ends_gathered, fit_freedoms, starts
+from urdfkin.dh.compare.fit import (
+    HASTY,
+    TableArrays,
+    TargetPoses,
+    as_written,
+    ends_gathered,
+    fit_freedoms,
+    starts,
+)
 from urdfkin.dh.compare.result import CellDifference, Fitted, Mistake, MistakeKind, resolution
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.kinematics.rotation import log_rotation, polar_factor
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
@@ -44,7 +52,7 @@ class _Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class MistakeSearch:
     """A search for a single mistake in the table of a path.
 
     Attributes:
@@ -98,17 +106,17 @@ class Search:
         model = self._with_zeros(table)
         return model is not None and self._fitted(_model(table), model).count <= 1
 
-    def _agrees(self, model: Model) -> bool:
+    def _agrees(self, model: TableArrays) -> bool:
         metres, radians = self.judged.apart(model)
         return metres <= self.tolerance and radians * self.judged.scale <= self.tolerance
 
     # -- fits, from no parameters to all parameters -----------------------------------------------------
 
-    def _as_written(self, table: DHTable) -> Model | None:
+    def _as_written(self, table: DHTable) -> TableArrays | None:
         model = _model(table)
         return model if self._agrees(model) else None
 
-    def _with_one_end(self, table: DHTable) -> Model | None:
+    def _with_one_end(self, table: DHTable) -> TableArrays | None:
         """Fit only the tool, or else only the base; return None if neither makes the table agree."""
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
@@ -116,7 +124,7 @@ class Search:
         base = replace(model, base=_mean(wanted @ np.linalg.inv(poses) @ model.base))
         return next((one for one in (tool, base) if self._agrees(one)), None)
 
-    def _with_both_ends(self, table: DHTable) -> Model | None:
+    def _with_both_ends(self, table: DHTable) -> TableArrays | None:
         """Fit base and tool; the start value of the base is a solution of A X = X B."""
         model = _model(table)
         poses, wanted = model.poses(self.tried.values), self.tried.poses
@@ -127,9 +135,9 @@ class Search:
         found = start if self._agrees(start) else fit_freedoms(start, self.tried, turns=False, ends=True)
         return found if self._agrees(found) else None
 
-    def _with_zeros(self, table: DHTable) -> Model | None:
+    def _with_zeros(self, table: DHTable) -> TableArrays | None:
         """Fit base, tool, joint offsets and joint signs; return the fit with the fewest changes."""
-        standard, written = to_convention(table, Convention.STANDARD), _model(table)
+        standard, written = to_convention(table, DHConvention.STANDARD), _model(table)
         models = [
             ends_gathered(fit_freedoms(start, self.tried, turns=False), written)
             for start in starts(self.chain, standard, written, *HASTY)
@@ -137,7 +145,7 @@ class Search:
         agreeing = [model for model in models if self._agrees(model)]
         return min(agreeing, key=lambda model: self._fitted(written, model).count, default=None)
 
-    def _fitted(self, written: Model, model: Model) -> Fitted:
+    def _fitted(self, written: TableArrays, model: TableArrays) -> Fitted:
         """Return the free parameters whose change is larger than the resolution of the fit."""
         metres, radians = self.judged.apart(model)
         fine = resolution(metres / self.judged.scale, radians)
@@ -154,7 +162,7 @@ class Search:
         reversed_ = int((model.senses != written.senses).sum())
         return Fitted(ends[0], ends[1], int((zeros > fine).sum()), reversed_)
 
-    def _mistake(self, reference: DHTable, change: _Change, model: Model) -> Mistake:
+    def _mistake(self, reference: DHTable, change: _Change, model: TableArrays) -> Mistake:
         metres, radians = self.judged.apart(model)
         cell = None
         if change.cell is not None:
@@ -167,8 +175,8 @@ class Search:
         return Mistake(change.kind, change.rows, cell, change.table, fitted, metres, radians)
 
 
-def _model(table: DHTable) -> Model:
-    return as_written(to_convention(table, Convention.STANDARD))
+def _model(table: DHTable) -> TableArrays:
+    return as_written(to_convention(table, DHConvention.STANDARD))
 
 
 def _changes(reference: DHTable) -> Iterator[_Change]:

@@ -12,7 +12,7 @@ import numpy as np
 from urdfkin.dh.export.text import added, pose_matrix
 from urdfkin.dh.table import DHRow, DHTable, nearest_twelfth
 from urdfkin.dh.units import Units
-from urdfkin.errors import Question
+from urdfkin.errors import QuestionsSection
 from urdfkin.errors.display import Matrix, Table, TextDocument
 from urdfkin.kinematics.roundings import EPS, of_a_fit
 
@@ -121,7 +121,7 @@ class Mistake:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+class TableComparison:
     """Result of a comparison of a table with a URDF.
 
     Attributes:
@@ -211,7 +211,7 @@ def resolution(share: float, radians: float) -> float:
     return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
 
 
-def document(found: Comparison, units: Units) -> TextDocument:
+def document(found: TableComparison, units: Units) -> TextDocument:
     title, *verdict = _verdict(found)
     parts: Parts = [*verdict, *(_mistakes(found, units) if found.mistakes else _cells(found, units))]
     if found.residual > EXPLAINED * found.reach and not found.mistakes:
@@ -224,11 +224,11 @@ def document(found: Comparison, units: Units) -> TextDocument:
     if found.agrees or not found.mistakes:
         parts += _fitted(found, units)
     if not found.agrees:
-        parts += ["", str(Question.DH_AND_URDF_DISAGREE)]
+        parts += ["", str(QuestionsSection.DH_AND_URDF_DISAGREE)]
     return TextDocument(title, parts)
 
 
-def _fitted(found: Comparison, units: Units) -> Parts:
+def _fitted(found: TableComparison, units: Units) -> Parts:
     parts: Parts = []
     table, fine = found.reference, resolution(found.metres / found.reach, found.radians)
     moved = [
@@ -245,7 +245,7 @@ def _fitted(found: Comparison, units: Units) -> Parts:
     return parts
 
 
-def _verdict(found: Comparison) -> list[str]:
+def _verdict(found: TableComparison) -> list[str]:
     table = found.reference
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
@@ -294,7 +294,7 @@ def _off(metres: float, radians: float) -> str:
     return f"the tip is off by up to {metres * 1e3:.3g} mm and {radians:.3g} rad"
 
 
-def _proven(found: Comparison) -> str:
+def _proven(found: TableComparison) -> str:
     if found.exact:
         return "rounding alone"
     if math.isinf(found.most_metres):
@@ -302,7 +302,7 @@ def _proven(found: Comparison) -> str:
     return f"{found.most_metres * 1e3:.3g} mm and {found.most_radians:.3g} rad"
 
 
-def _mistakes(found: Comparison, units: Units) -> list[str]:
+def _mistakes(found: TableComparison, units: Units) -> list[str]:
     first = found.mistakes[0]
     left = "without a fit" if not first.fitted.count else f"after a fit of only {first.fitted}"
     count = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
@@ -331,7 +331,7 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
     return f"{row}: {one.cell} = {write(one.urdf)} {unit}, not {write(one.reference)} ({why})"
 
 
-def _cells(found: Comparison, units: Units) -> Parts:
+def _cells(found: TableComparison, units: Units) -> Parts:
     unit = f"({units.length_name}, {units.angle_name})"
     parts: Parts = []
     if found.differences:

@@ -22,13 +22,13 @@ from typing import Any
 import numpy as np
 
 from urdfkin.dh.compare.agreement import best_fit, compare
-from urdfkin.dh.compare.result import Comparison
+from urdfkin.dh.compare.result import TableComparison
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import Choices, Last, derive
 from urdfkin.dh.rows import ORDER, table_from_mapping
-from urdfkin.dh.table import Convention, DHTable, convention_of, looks_round
+from urdfkin.dh.table import DHConvention, DHTable, convention_of, looks_round
 from urdfkin.dh.units import Angles, Lengths, units_of
-from urdfkin.errors import InputError, Question, RangeError
+from urdfkin.errors import InputError, QuestionsSection, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
@@ -115,7 +115,7 @@ def diagnose(
 
 def convention_that_fits(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
-) -> Convention:
+) -> DHConvention:
     """Find the convention of a table whose file names no convention, by a comparison with a path.
 
     `tolerance` is the tolerance at the tip (metres).
@@ -123,9 +123,9 @@ def convention_that_fits(
     Raises:
         InputError: both conventions fit equally well, or neither convention fits, even in other units.
     """
-    found = list[tuple[Convention, Comparison]]()
+    found = list[tuple[DHConvention, TableComparison]]()
     errors = list[InputError]()
-    for convention in Convention:
+    for convention in DHConvention:
         try:
             table = table_from_mapping({**data, "convention": convention})
             found.append((convention, compare(chain, table, tolerance)))
@@ -147,7 +147,7 @@ def convention_that_fits(
         where=where,
         found=f"tip errors {' and '.join(f'{how.metres * 1e3:.3g} mm as {one}' for one, how in found)}",
         remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
-        question=Question.WHICH_DH_CONVENTION,
+        question=QuestionsSection.WHICH_DH_CONVENTION,
     )
 
 
@@ -162,7 +162,7 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     set to zero. The offset along the first axis is left out, because a change of the base has the same
     effect.
     """
-    rows = to_convention(table, Convention.STANDARD).rows
+    rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, known = list[float](), 0.0, False
     for row, following in pairwise(rows):
         placed = row.kind.turns and following.kind.turns
@@ -195,7 +195,7 @@ class ConventionHypothesis:
             d and theta, or are unnamed and in this order.
     """
 
-    convention: Convention | None
+    convention: DHConvention | None
     lengths: Lengths
     angles: Angles
     columns: tuple[str, ...] = ORDER
@@ -244,7 +244,9 @@ def other_readings(data: Mapping[str, Any]) -> Iterator[tuple[ConventionHypothes
     if not isinstance(rows, list) or not all(isinstance(row, (list, Mapping)) for row in rows):
         return
     data, said = {**data, "rows": [_row(row) for row in rows]}, as_said(data)
-    every = (ConventionHypothesis(*one) for one in product(Convention, Lengths, Angles, permutations(ORDER)))
+    every = (
+        ConventionHypothesis(*one) for one in product(DHConvention, Lengths, Angles, permutations(ORDER))
+    )
     for reading in sorted(every, key=lambda one: one.slips(said)):
         if reading == said:
             continue

@@ -13,7 +13,7 @@ from fractions import Fraction
 from typing import Any
 
 from urdfkin.dh.export.text import cells, formula
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.dh.units import Units, fraction_text, pi_fraction
 from urdfkin.errors import InputError
 from urdfkin.model.tree import FloatArray, is_bounded
@@ -167,7 +167,7 @@ def write_sympy(table: DHTable) -> str:
             base=base,
             tool=tool,
             formula=formula(table),
-            product="S @ X" if table.convention is Convention.STANDARD else "X @ S",
+            product="S @ X" if table.convention is DHConvention.STANDARD else "X @ S",
             n=n,
         )
     )
@@ -212,5 +212,5 @@ def write_matlab_symbolic(table: DHTable) -> str:
     lines += ["T = base;", "for i = 1:size(rows, 1)"]
     lines += ["    a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4);"]
     lines += [f"    beta = {'rows(i, 5)' if table.has_hayati_rows else '0'};"]
-    product = "S * (X * Y)" if table.convention is Convention.STANDARD else "(X * Y) * S"
+    product = "S * (X * Y)" if table.convention is DHConvention.STANDARD else "(X * Y) * S"
     return "\n".join([*lines, _FRAMES.format(product=product)])

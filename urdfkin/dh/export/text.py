@@ -13,19 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.table import Convention, DHRow, DHTable
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.dh.units import Angles, Units
-from urdfkin.errors.display import Code, Matrix, Table, TextDocument
+from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
 FORMULA = {
-    Convention.STANDARD: "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha)",
-    Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Rz(theta) Tz(d)",
+    DHConvention.STANDARD: "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha)",
+    DHConvention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Rz(theta) Tz(d)",
 }
 HAYATI_FORMULA = {
-    Convention.STANDARD: "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)",
-    Convention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
+    DHConvention.STANDARD: "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)",
+    DHConvention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
 }
 
 #: A number is multiplied by this factor before it is rounded up to three digits.
@@ -91,7 +91,7 @@ def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any
 
 
 def headings(table: DHTable, units: Units) -> list[str]:
-    at = "(i-1)" if table.convention is Convention.MODIFIED else ""
+    at = "(i-1)" if table.convention is DHConvention.MODIFIED else ""
     angle, length = units.angle_name, units.length_name
     named = {
         "a": f"a{at} [{length}]",
@@ -152,7 +152,7 @@ def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = Fa
     `pi` is the notation of pi. With `wrapped`, long sentences are broken into several lines.
     """
     rows = [(str(i), row.joint, *cells(table, row, units, pi)) for i, row in enumerate(table.rows, 1)]
-    parts: list[str | Table | Matrix] = [Code(formula(table)), ""]
+    parts: list[str | Table | Matrix] = [CodeLine(formula(table)), ""]
     parts.append(Table(("i", "joint", *headings(table, units)), rows, left=(1,), names=(1,)))
     parts += [] if table.rows else ["(no joint between the two frames moves)"]
     parts += ["", names] if (names := coordinate_names(table)) else []
@@ -184,14 +184,14 @@ def write_html(table: DHTable, units: Units) -> str:
 
 
 _FORMULA = {
-    Convention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
-    Convention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
+    DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
+    DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
 
 
 def write_latex(table: DHTable, units: Units) -> str:
     """Return a LaTeX table environment; it needs the packages amsmath, booktabs and graphicx."""
-    modified = table.convention is Convention.MODIFIED
+    modified = table.convention is DHConvention.MODIFIED
     at = "_{i-1}" if modified else "_i"
     angle = "rad" if units.angles is Angles.RADIANS else r"$^\circ$"
     length = units.length_name

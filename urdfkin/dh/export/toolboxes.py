@@ -24,8 +24,8 @@ from urdfkin.dh.export.code import bounds, demand_free, docstring, header, ident
 from urdfkin.dh.export.text import fitted, is_identity, maths, pose, pose_matrix
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import axes_and_steps
-from urdfkin.dh.table import Convention, DHRow, DHTable
-from urdfkin.errors.display import Code, Matrix, Table, TextDocument, six_digits
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
+from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument, six_digits
 from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
@@ -44,8 +44,8 @@ def write_roboticstoolbox(table: DHTable) -> str:
     return "\n".join([*lines, ")"]) + "\n"
 
 
-def _link(row: DHRow, convention: Convention) -> str:
-    suffix = "DH" if convention is Convention.STANDARD else "MDH"
+def _link(row: DHRow, convention: DHConvention) -> str:
+    suffix = "DH" if convention is DHConvention.STANDARD else "MDH"
     kind, constant, offset = (
         ("Revolute", f"d={row.d!r}", row.theta)
         if row.kind.turns
@@ -99,7 +99,7 @@ def joint_transform(row: DHRow) -> list[str]:
     return ["flip=True"] * (row.sense < 0) + ([f"qlim=[{limits}]"] if limits else [])
 
 
-def _row(row: DHRow, convention: Convention) -> list[str]:
+def _row(row: DHRow, convention: DHConvention) -> list[str]:
     moves = ", ".join(joint_transform(row))
     along = [
         *_unless_zero("Rz", row.theta),
@@ -108,7 +108,7 @@ def _row(row: DHRow, convention: Convention) -> list[str]:
     ]
     along += [f"ET.tz({moves})"] * (not row.kind.turns)
     across = [*_unless_zero("tx", row.a), *_unless_zero("Rx", row.alpha), *_unless_zero("Ry", row.beta)]
-    return along + across if convention is Convention.STANDARD else across + along
+    return along + across if convention is DHConvention.STANDARD else across + along
 
 
 def _unless_zero(name: str, value: float) -> list[str]:
@@ -135,7 +135,7 @@ def write_screws(screws: ProductOfExponentials, form: str, digits: int = 10) -> 
 
 
 def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocument:
-    parts: list[str | Table | Matrix] = [Code(FORMULA)]
+    parts: list[str | Table | Matrix] = [CodeLine(FORMULA)]
     heads = ("i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
     for what, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
         body = [

@@ -16,7 +16,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from urdfkin.errors import InputError, Question, UnknownNameError
+from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.kinematics.inputs import scalars
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of
 from urdfkin.model import configuration
@@ -31,7 +31,7 @@ _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 
 @dataclass(frozen=True, slots=True)
-class _Column:
+class _TargetNumber:
     """One number of the target program's q: `factor * value + zero`, where `value` is urdfkin's `q[at]`.
 
     `part` is "cos" or "sin" for a continuous joint that the target program stores as two numbers. `copy` is
@@ -48,7 +48,7 @@ class _Column:
 
 
 @dataclass(frozen=True, slots=True)
-class _Block:
+class _FreeJoint:
     """A planar or floating joint whose velocity has other axes or another point in the target program."""
 
     joint: Joint
@@ -93,10 +93,10 @@ class Conversion:
         for name in convention.rules:
             self._index(name)
         self._order = self._ordered()
-        self._columns, self._units = list[_Column](), list[str]()
+        self._columns, self._units = list[_TargetNumber](), list[str]()
         self._v_names, self._v_units = list[str](), list[str]()
         self._v_index, self._v_factor = list[int](), list[float]()
-        self._v_copies, self._blocks, names = set[int](), list[_Block](), list[str]()
+        self._v_copies, self._blocks, names = set[int](), list[_FreeJoint](), list[str]()
         for i in self._order:
             names.append(self._add(i))
         self.joint_names = tuple(names)
@@ -253,10 +253,12 @@ class Conversion:
         unit = ("rad" if turns else "m") if abs(factor) == 1.0 else ""
         copy, zero, factor = bool(joint.mimic), factor * offset + rule.zero, factor * multiplier
         if joint.kind is JointKind.CONTINUOUS and how.continuous == 2:
-            both = [_Column(f"{name}.{part}", q, factor, zero, part, copy=copy) for part in ("cos", "sin")]
+            both = [
+                _TargetNumber(f"{name}.{part}", q, factor, zero, part, copy=copy) for part in ("cos", "sin")
+            ]
             self._columns += both
         else:
-            self._columns.append(_Column(name, q, factor, zero, "", unit, copy))
+            self._columns.append(_TargetNumber(name, q, factor, zero, "", unit, copy))
         if joint.mimic:
             self._v_copies.add(len(self._v_index))
         self._add_rates([name], [unit], [v], [factor])
@@ -269,8 +271,8 @@ class Conversion:
 
     def _add_floating(self, i: int, name: str, q: int, v: int) -> None:
         how, joint = self.convention, self.tree.joints[i]
-        position = [_Column(f"{name}.{x}", q + k, unit="m") for k, x in enumerate("xyz")]
-        turn = [_Column(f"{name}.q{x}", q + 3 + "xyzw".index(x)) for x in how.quaternion]
+        position = [_TargetNumber(f"{name}.{x}", q + k, unit="m") for k, x in enumerate("xyz")]
+        turn = [_TargetNumber(f"{name}.q{x}", q + 3 + "xyzw".index(x)) for x in how.quaternion]
         self._columns += position + turn if how.base_q == "position first" else turn + position
         point = np.zeros(3) if how.point == "origin" else self._centre_of_mass(self.tree.links[i + 1])
         rates = [*range(6)] if how.base_v == "linear first" else _SWAPPED
@@ -284,20 +286,20 @@ class Conversion:
             [factors[k] for k in rates],
         )
         if "parent" in (how.linear, how.angular) or point.any():
-            self._blocks.append(_Block(joint, q, v, slice(first, first + 6), point))
+            self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 6), point))
 
     def _add_planar(self, i: int, name: str, q: int, v: int) -> None:
         how, joint = self.convention, self.tree.joints[i]
-        self._columns += [_Column(f"{name}.{x}", q + k, unit="m") for k, x in enumerate("xy")]
+        self._columns += [_TargetNumber(f"{name}.{x}", q + k, unit="m") for k, x in enumerate("xy")]
         if how.continuous == 2:
-            self._columns += [_Column(f"{name}.{part}", q + 2, part=part) for part in ("cos", "sin")]
+            self._columns += [_TargetNumber(f"{name}.{part}", q + 2, part=part) for part in ("cos", "sin")]
         else:
-            self._columns.append(_Column(f"{name}.angle", q + 2, how.angle_factor, unit="rad"))
+            self._columns.append(_TargetNumber(f"{name}.angle", q + 2, how.angle_factor, unit="rad"))
         first = len(self._v_index)
         names = [f"{name}.{x}" for x in ("vx", "vy", "wz")]
         self._add_rates(names, ["m", "m", "rad"], [v, v + 1, v + 2], [1.0, 1.0, how.angle_factor])
         if how.planar == "parent":
-            self._blocks.append(_Block(joint, q, v, slice(first, first + 3), np.zeros(3)))
+            self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
         """Return the centre of mass (3,) of a link in the link's frame, from the URDF text."""
@@ -462,7 +464,7 @@ class Conversion:
             raise InputError(
                 f"{what} needs {width} numbers in the convention {self.convention.name}: {', '.join(names)}",
                 found=f"shape {array.shape}",
-                question=Question.JOINT_ORDER,
+                question=QuestionsSection.JOINT_ORDER,
             )
         return array
 
@@ -514,7 +516,7 @@ class Conversion:
                     where=column.name,
                     found=f"{apart:.3g} rad or m from the rule",
                     remedy="correct the value, or load with mimic=False (--no-mimic)",
-                    question=Question.MIMIC_JOINTS,
+                    question=QuestionsSection.MIMIC_JOINTS,
                 )
 
     def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
@@ -596,7 +598,7 @@ class Conversion:
         found[..., self._v_source] = _inverse(M[..., self._v_source, :])
         return found
 
-    def _block(self, block: _Block, q: FloatArray) -> FloatArray:
+    def _block(self, block: _FreeJoint, q: FloatArray) -> FloatArray:
         """Return the block of `matrix` for a planar joint (..., 3, 3) or a floating joint (..., 6, 6)."""
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
@@ -612,7 +614,7 @@ class Conversion:
         turn = R if how.angular == "parent" else np.eye(3)
         return self._rows(A, -A @ _cross(block.point), unit * turn)
 
-    def _block_rate(self, block: _Block, q: FloatArray, v: FloatArray) -> FloatArray:
+    def _block_rate(self, block: _FreeJoint, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the time derivative of `_block` for the joint's velocity v."""
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
@@ -745,7 +747,7 @@ class Conversion:
                 " adds it to that of the mimicked joint",
                 where=f"joint {name}",
                 remedy="load with mimic=False (--no-mimic)",
-                question=Question.MIMIC_JOINTS,
+                question=QuestionsSection.MIMIC_JOINTS,
             )
 
 

@@ -38,9 +38,9 @@ from urdfkin.model.mechanisms.mechanism import (
     FramePair,
     Gauge,
     JointTransform,
+    MatchedJoints,
     Mechanism,
     Screw,
-    Step,
     Tolerance,
     along,
     apart,
@@ -355,7 +355,9 @@ class MechanismMatcher:
         ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
-    def _step(self, place: Place, e: Edge, f: Edge, index: int, depth: int) -> tuple[Step, Place, Score]:
+    def _step(
+        self, place: Place, e: Edge, f: Edge, index: int, depth: int
+    ) -> tuple[MatchedJoints, Place, Score]:
         """Match two joints. Return their step, the bodies after them (`Place`), and the score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
@@ -370,7 +372,7 @@ class MechanismMatcher:
 
     def _unlike(
         self, place: Place, via: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
-    ) -> Step:
+    ) -> MatchedJoints:
         """Return the step for two joints of different kinds. One of the joints may be fixed."""
         unlike = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
         if unlike == "a":
@@ -378,19 +380,19 @@ class MechanismMatcher:
         else:
             axis = _outwards(self.a.screw(via[0]), backwards[0])
         kind = kinds[1] if unlike == "a" else kinds[0]
-        return Step(
+        return MatchedJoints(
             via[0].joint, via[1].joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0, unlike
         )
 
     def _free(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, kind: str
-    ) -> tuple[Step, Place, Score]:
+    ) -> tuple[MatchedJoints, Place, Score]:
         """Match two planar or two floating joints, whose frames and zeros may differ."""
         e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
         at, seen = place.G @ homes[0], place.XC @ homes[1]
         axis, back = Screw(homes[0][:3, 2], homes[0][:3, 3]), backwards[0] != backwards[1]
-        step = Step(e.joint, f.joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0)
+        step = MatchedJoints(e.joint, f.joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0)
         given = None if self.gauge is None else self.gauge.conversions.get(self.a.joint(e).name)
         as_written = self.gauge is not None and given is None
         if as_written:
@@ -453,7 +455,7 @@ class MechanismMatcher:
 
     def _like(
         self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, *, turns: bool
-    ) -> tuple[Step, Place, Score]:
+    ) -> tuple[MatchedJoints, Place, Score]:
         """Match two revolute joints or two prismatic joints.
 
         The method chooses the sign and the zero offset of B's joint, and decides whether the two axes differ.
@@ -476,17 +478,25 @@ class MechanismMatcher:
                 zero = turn_about(t.direction, T[:3, :3]) if turns else float(t.direction @ T[:3, 3])
                 zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
-            return Step(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0), there, score
+            return (
+                MatchedJoints(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0),
+                there,
+                score,
+            )
         # Either the joint and all bodies after it have another pose in B, or only the joint's axis differs.
         with_it = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
             if better(self._score(alone[1]), self._score(with_it[1])):
                 other = end.moved(back)
-                step = Step(a, b, kind, place.previous, sense, alone[0], IDENTITY, s, other, tilt, shift)
+                step = MatchedJoints(
+                    a, b, kind, place.previous, sense, alone[0], IDENTITY, s, other, tilt, shift
+                )
                 return step, *alone[1:]
         before = back @ K @ place.G
-        return Step(a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift), *with_it[1:]
+        return MatchedJoints(
+            a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift
+        ), *with_it[1:]
 
     def _exact_pose(self, place: Place, there: Place) -> FloatArray | None:
         """Return `XC` of the bodies after two joints if the subtrees below them match exactly, else None."""
@@ -880,7 +890,7 @@ def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
     return determined, any(frame.tool is IDENTITY for frame in carried)
 
 
-def _keeps_axis(one: Step, other: Step) -> bool:
+def _keeps_axis(one: MatchedJoints, other: MatchedJoints) -> bool:
     """Return whether the axis of the second joint stays fixed when the first joint moves."""
     if "turns" not in (one.kind, other.kind):
         return other.kind == "prismatic"

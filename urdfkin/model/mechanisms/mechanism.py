@@ -416,7 +416,7 @@ IDENTITY.setflags(write=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class MatchedJoints:
     """A joint of A and the matched joint of B.
 
     Attributes:
@@ -516,7 +516,7 @@ class Alignment:
     b: Mechanism
     base: tuple[int, int]
     X: FloatArray
-    steps: list[Step] = field(default_factory=list)
+    steps: list[MatchedJoints] = field(default_factory=list)
     frames: list[FramePair] = field(default_factory=list)
     only_a: list[int] = field(default_factory=list)
     only_b: list[int] = field(default_factory=list)
@@ -613,7 +613,7 @@ class Alignment:
             previous = self.steps[previous].previous
         return found[::-1]
 
-    def path(self, previous: int) -> list[Step]:
+    def path(self, previous: int) -> list[MatchedJoints]:
         return [self.steps[i] for i in self.indices(previous)]
 
     @property
@@ -630,7 +630,7 @@ class Gauge:
         base: A link of A and a link of B. The search for matching joints starts at the bodies of these two
             links. If `base` is None, the search chooses its first bodies by link names.
         X: (4, 4) pose of B's root in A's root frame.
-        zeros: (`sense`, `offset`) of `Step`, by the joint's name in A; a missing joint has (1, 0.0).
+        zeros: (`sense`, `offset`) of `MatchedJoints`, by the joint's name in A; a missing joint has (1, 0.0).
         conversions: Converts A's coordinates of a planar or floating joint to B's if they differ.
         orders: Each entry lists some consecutive joints of B in their new order.
     """
@@ -647,16 +647,16 @@ AS_WRITTEN = Gauge()
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LinearFunction:
     """The linear function constant + slope * variable. If the slope is 0, `variable` has no meaning."""
 
     variable: str
     slope: float
     constant: float
 
-    def moved(self, slope: float, constant: float) -> Line:
+    def moved(self, slope: float, constant: float) -> LinearFunction:
         """Return the linear function slope * f + constant, where f is this linear function."""
-        return Line(self.variable, slope * self.slope, slope * self.constant + constant)
+        return LinearFunction(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
         """Return the function's value for the given values of variables; a variable without a value is 0."""
@@ -664,13 +664,13 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class MatchedValues:
     """The values of two matched joints, with the positive direction and the zero of A's joint."""
 
-    a: Line
-    b: Line
+    a: LinearFunction
+    b: LinearFunction
     #: The value of B's joint as B's URDF defines it: sense * b + offset.
-    written: Line
+    written: LinearFunction
     #: Rounding error (rad or m) that was removed from the constant of `b`, minus that of one step.
     rounding: float = 0.0
 
@@ -695,25 +695,25 @@ class Variables:
         leaders: Each coordinate of B as a linear function of a variable, by the joint's name in B.
     """
 
-    pairs: tuple[Pair | None, ...]
+    pairs: tuple[MatchedValues | None, ...]
     ranges: dict[str, tuple[float, float]]
     freer_a: tuple[int, ...]
     freer_b: tuple[int, ...]
     rules: tuple[int, ...]
-    leaders: dict[str, Line]
+    leaders: dict[str, LinearFunction]
 
-    def range(self, line: Line) -> tuple[float, float]:
+    def range(self, line: LinearFunction) -> tuple[float, float]:
         """Return the smallest and the largest value of a linear function over the ranges of the variables."""
         if not line.slope:
             return line.constant, line.constant
         ends = sorted(line.slope * end + line.constant for end in self.ranges[line.variable])
         return ends[0], ends[1]
 
-    def off(self, pair: Pair) -> float:
+    def off(self, pair: MatchedValues) -> float:
         """Return the largest difference (rad or m) between a joint's values in A and in B."""
         if (variable := pair.variable) is not None:
             low, high = self.range(
-                Line(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
+                LinearFunction(variable, pair.b.slope - pair.a.slope, pair.b.constant - pair.a.constant)
             )
         else:
             (a_low, a_high), (b_low, b_high) = self.range(pair.a), self.range(pair.b)
@@ -723,10 +723,10 @@ class Variables:
 
 def variables_of(found: Alignment, tolerance: Tolerance) -> Variables:
     """Return the joint values of all steps of an alignment, and the ranges of their variables."""
-    return _Maker(found, tolerance).make()
+    return _MechanismBuilder(found, tolerance).make()
 
 
-class _Maker:
+class _MechanismBuilder:
     def __init__(self, found: Alignment, tolerance: Tolerance) -> None:
         self.found, self.tolerance = found, tolerance
         self.trees = found.a.tree, found.b.tree
@@ -734,17 +734,17 @@ class _Maker:
         self.leaders = self._leaders()
         self.deepest = found.deepest
 
-    def _leaders(self) -> dict[str, Line]:
+    def _leaders(self) -> dict[str, LinearFunction]:
         """Return each coordinate of B: a linear function of a coordinate of A, or a new variable.
 
         Joints that are independent in A are processed before joints that are mimic joints in A.
         """
-        tree, used, lines = self.trees[1], set[str](), dict[str, Line]()
+        tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
         followers_last = sorted(own, key=self._follows_in_a)
         for i in followers_last:
             name = tree.joints[i].name
-            lines[name] = Line(f"b:{name}", 1.0, 0.0)
+            lines[name] = LinearFunction(f"b:{name}", 1.0, 0.0)
             step = self.step_of_b.get(i)
             if step is None or step.unlike:
                 continue
@@ -758,24 +758,24 @@ class _Maker:
         step = self.step_of_b.get(joint_b)
         return step is not None and self.trees[0].joints[step.a].mimic is not None
 
-    def _a(self, step: Step) -> Line:
+    def _a(self, step: MatchedJoints) -> LinearFunction:
         joint = self.trees[0].joints[step.a]
         if joint.kind is JointKind.FIXED:
-            return Line("", 0.0, 0.0)
+            return LinearFunction("", 0.0, 0.0)
         if joint.mimic is None:
-            return Line(f"a:{joint.name}", 1.0, 0.0)
-        return Line(f"a:{joint.mimic.leader}", joint.mimic.multiplier, joint.mimic.offset)
+            return LinearFunction(f"a:{joint.name}", 1.0, 0.0)
+        return LinearFunction(f"a:{joint.mimic.leader}", joint.mimic.multiplier, joint.mimic.offset)
 
-    def _b(self, step: Step) -> Line:
+    def _b(self, step: MatchedJoints) -> LinearFunction:
         joint = self.trees[1].joints[step.b]
         if joint.kind is JointKind.FIXED:
-            return Line("", 0.0, 0.0)
+            return LinearFunction("", 0.0, 0.0)
         if joint.mimic is None:
             return self.leaders[joint.name]
         return self.leaders[joint.mimic.leader].moved(joint.mimic.multiplier, joint.mimic.offset)
 
     def make(self) -> Variables:
-        pairs, freer_a, freer_b, rules = list[Pair | None](), list[int](), list[int](), list[int]()
+        pairs, freer_a, freer_b, rules = list[MatchedValues | None](), list[int](), list[int](), list[int]()
         for i, step in enumerate(self.found.steps):
             if step.kind in ("planar", "floating") or step.unlike == "kind":
                 pairs.append(None)
@@ -793,11 +793,11 @@ class _Maker:
                 (
                     freer_a if follow == [False, True] else freer_b if follow == [True, False] else rules
                 ).append(i)
-            pairs.append(Pair(a, b, written, beyond))
+            pairs.append(MatchedValues(a, b, written, beyond))
         ranges = self._ranges(pairs)
         return Variables(tuple(pairs), ranges, tuple(freer_a), tuple(freer_b), tuple(rules), self.leaders)
 
-    def _alike(self, a: Line, b: Line) -> bool:
+    def _alike(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two linear functions differ by rounding only.
 
         The offset of a mimic rule depends on the zero offsets of two joints. urdfkin computes a joint's zero
@@ -809,10 +809,10 @@ class _Maker:
         one = self._one_step(a)
         return same and abs(a.slope - b.slope) <= one and abs(a.constant - b.constant) <= self.deepest * one
 
-    def _one_step(self, line: Line) -> float:
+    def _one_step(self, line: LinearFunction) -> float:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
-    def _ranges(self, pairs: list[Pair | None]) -> dict[str, tuple[float, float]]:
+    def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
         """Return the range of each coordinate, computed from the limits of the independent joints it moves.
 
         If a coordinate moves a joint of A and a joint of B, its range is the intersection of their limits. If

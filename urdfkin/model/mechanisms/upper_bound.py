@@ -42,9 +42,9 @@ from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
     FramePair,
-    Pair,
+    MatchedJoints,
+    MatchedValues,
     Screw,
-    Step,
     Variables,
     apart,
 )
@@ -235,7 +235,7 @@ def upper_bounds(
 
 def behind_first(
     found: Alignment, variables: Variables, frame: FramePair
-) -> tuple[list[Step], list[Pair | None]]:
+) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the steps and joint values on the path to a frame, starting with the first step that differs."""
     steps = found.path(frame.previous)
     pairs = [variables.pairs[i] for i in found.indices(frame.previous)]
@@ -243,12 +243,15 @@ def behind_first(
     return steps[first:], pairs[first:]
 
 
-def _differs(step: Step, pair: Pair | None) -> bool:
+def _differs(step: MatchedJoints, pair: MatchedValues | None) -> bool:
     return step.differs or bool(step.unlike) or (pair is not None and pair.a != pair.b)
 
 
 def _radians(
-    steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair
+    steps: Sequence[MatchedJoints],
+    pairs: Sequence[MatchedValues | None],
+    variables: Variables,
+    frame: FramePair,
 ) -> float:
     """Return a bound (rad) on the angle between a frame's orientations in A and B.
 
@@ -271,7 +274,11 @@ def _radians(
 
 
 def _metres(
-    steps: Sequence[Step], pairs: Sequence[Pair | None], variables: Variables, frame: FramePair, grid: Grid
+    steps: Sequence[MatchedJoints],
+    pairs: Sequence[MatchedValues | None],
+    variables: Variables,
+    frame: FramePair,
+    grid: Grid,
 ) -> float:
     d, y = at_the_frame(frame, grid)
     ways = _off(frame.end, y.largest())
@@ -301,7 +308,7 @@ def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 
 
 def passed(
-    step: Step, pair: Pair | None, variables: Variables, d: Support, y: Support
+    step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return d and y of the recursion (module docstring) after one more joint."""
     # A planar or floating joint has no limits, so it may rotate d into any direction.
@@ -316,7 +323,7 @@ def passed(
     return before_it(step, d, y)
 
 
-def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
+def before_it(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
     """Return d and y of the recursion (module docstring) after the constant rigid motion L of a step."""
     if step.before is IDENTITY:
         return d, y
@@ -324,7 +331,9 @@ def before_it(step: Step, d: Support, y: Support) -> tuple[Support, Support]:
     return Support(d.grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.moved(L)
 
 
-def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Support) -> Support:
+def difference(
+    step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
+) -> Support:
     """Return d of the recursion (module docstring) after one more joint, but before its motion L."""
     same = step.other is step.axis and pair.a == pair.b
     if step.kind == "turns":
@@ -338,7 +347,9 @@ def difference(step: Step, pair: Pair, variables: Variables, y: Support, d: Supp
     return d if same else d + _prismatic_difference(step, pair, variables, y.grid)
 
 
-def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Grid) -> Support:
+def _prismatic_difference(
+    step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
+) -> Support:
     """Return the support function of the difference between the translations by two matched prismatic joints.
 
     The difference is largest if each joint value is at one of its limits.
@@ -357,7 +368,7 @@ def _prismatic_difference(step: Step, pair: Pair, variables: Variables, grid: Gr
     return Support(grid, np.where(np.isnan(worst), np.inf, worst))
 
 
-def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
+def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
     """Return sample values (n,) of the variable that moves a revolute joint of A and its matched joint of B.
 
     The result is None if different variables move the two joints, or if more than `MOST_VALUES` samples are
@@ -375,7 +386,9 @@ def _values(pair: Pair, variables: Variables, grid: Grid) -> FloatArray | None:
     return np.linspace(low, high, count + 1) if count <= MOST_VALUES else None
 
 
-def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Support) -> Support:
+def _common_difference(
+    step: MatchedJoints, pair: MatchedValues, z: FloatArray, y: Support, d: Support
+) -> Support:
     """Return the result of `difference` for two revolute joints that the same variable moves.
 
     `z` contains sample values of the variable; let h be the distance between two neighbouring samples.
@@ -413,7 +426,9 @@ def _common_difference(step: Step, pair: Pair, z: FloatArray, y: Support, d: Sup
     return Support(y.grid, between.max(axis=0))
 
 
-def _independent_difference(step: Step, pair: Pair, variables: Variables, y: Support) -> Support:
+def _independent_difference(
+    step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support
+) -> Support:
     """Return the change of d by two revolute joints whose angles are treated as independent.
 
     If A and B have the same axis, a point's two positions differ at most by the chord of the largest

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from urdfkin.errors import Question, UnknownNameError
+from urdfkin.errors import QuestionsSection, UnknownNameError
 from urdfkin.errors.escape import printable
 from urdfkin.urdf import parser
 from urdfkin.urdf.findings import Rule
@@ -64,7 +64,7 @@ class Page:
     example: str
     cure: str
     others: str
-    question: Question | None = None
+    question: QuestionsSection | None = None
 
 
 def page(code: str) -> Page:
@@ -95,7 +95,9 @@ def _page(entry: dict[str, Any]) -> Page:
     prose = {key: " ".join(entry[key].split()) for key in ("title", "why", "others")}
     parts = entry.get("parts", {})
     texts = {key: _expand_parts(entry[key], parts) for key in ("example", "cure")}
-    return Page(**prose, **texts, question=Question(entry["question"]) if "question" in entry else None)
+    return Page(
+        **prose, **texts, question=QuestionsSection(entry["question"]) if "question" in entry else None
+    )
 
 
 def _expand_parts(text: str, parts: dict[str, Any]) -> str:

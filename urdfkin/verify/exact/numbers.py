@@ -28,7 +28,7 @@ from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Number, Vector
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock
 from urdfkin.system.locks import lock_over_forks
 from urdfkin.system.plain_xml import plain_xml
-from urdfkin.verify.bounds import Conversion
+from urdfkin.verify.bounds import DecimalErrors
 
 #: Number of digits in the accuracy study.
 #: A double has 16 digits, so fifty digits are enough to measure an error in its last digit.
@@ -113,7 +113,7 @@ def decimal(x: Number, negligible: float) -> str | None:
     return f"{rounded:f}" if -7 < rounded.adjusted() < _SIGNIFICANT else str(rounded)
 
 
-class Kind(NamedTuple):
+class NumberType(NamedTuple):
     """Functions for one type of number, for example intervals (`BALLS`).
 
     `number` converts a decimal in the URDF text, or the double to which a joint is locked.
@@ -124,15 +124,15 @@ class Kind(NamedTuple):
     root: Callable[[Number], Number]
 
 
-BALLS = Kind(exact, lambda angle: exact(angle).sin_cos(), lambda x: exact(x).sqrt())
+BALLS = NumberType(exact, lambda angle: exact(angle).sin_cos(), lambda x: exact(x).sqrt())
 
 
-def unit(x: Vector, kind: Kind = BALLS) -> Vector:
+def unit(x: Vector, kind: NumberType = BALLS) -> Vector:
     length = kind.root(eq.dot(x, x))
     return x[0] / length, x[1] / length, x[2] / length
 
 
-def about(axis: Vector, angle: Number, kind: Kind = BALLS) -> Matrix:
+def about(axis: Vector, angle: Number, kind: NumberType = BALLS) -> Matrix:
     """Return the rotation about a unit axis, R_k(phi) (eq. 7.28)."""
     s, c = kind.sine_cosine(angle)
     columns = (
@@ -145,14 +145,14 @@ def about(axis: Vector, angle: Number, kind: Kind = BALLS) -> Matrix:
     return found
 
 
-def from_rpy(rpy: Vector, kind: Kind = BALLS) -> Matrix:
+def from_rpy(rpy: Vector, kind: NumberType = BALLS) -> Matrix:
     """Return Rz(yaw) Ry(pitch) Rx(roll)."""
     x, y, z = ((*kind.sine_cosine(angle), 0, 1) for angle in rpy)
     found: Matrix = eq.product(eq.product(eq.about_z(*z), eq.about_y(*y)), eq.about_x(*x))
     return found
 
 
-def from_quaternion(quaternion: Sequence[Number], kind: Kind = BALLS) -> Matrix:
+def from_quaternion(quaternion: Sequence[Number], kind: NumberType = BALLS) -> Matrix:
     """Return the rotation of a quaternion (x, y, z, w) of any length."""
     length = kind.root(sum(x * x for x in quaternion))
     found: Matrix = eq.rotation_of_quaternion(*(x / length for x in quaternion))
@@ -206,7 +206,7 @@ class ExactJoint:
 
 
 def read_exact(
-    text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: Kind = BALLS
+    text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: NumberType = BALLS
 ) -> dict[int, ExactJoint]:
     """Read the exact numbers of the joints `among` (None: all), by the joints' index in the tree.
 
@@ -220,7 +220,7 @@ def read_exact(
     }
 
 
-def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> Conversion:
+def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
     """Return the errors that converting a URDF's decimals to doubles causes (`against_true_values`).
 
     `path` contains the indices of the joints of a frame's path, from the root. q has the shape (n, nq).
@@ -230,7 +230,7 @@ def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArra
 
 @lru_cache(maxsize=1)  # parsing a large URDF takes longer than computing the intervals of one sample
 class _Text:
-    def __init__(self, text: str, kind: Kind = BALLS) -> None:
+    def __init__(self, text: str, kind: NumberType = BALLS) -> None:
         self.kind = kind
         root = plain_xml(text)
         self.elements = {str(element.get("name")): element for element in root.findall("joint")}
@@ -295,7 +295,7 @@ class _Text:
             name = str(rule.get("joint"))
         return multiplier, offset
 
-    def conversion(self, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> Conversion:
+    def conversion(self, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
         at: dict[str, Any] = {
             joint.name: q[:, i] for joint, i in zip(tree.joints, tree.q_index, strict=True) if joint.nq == 1
         }
@@ -319,20 +319,20 @@ class _Text:
             if joint.kind.nv:
                 lengths.append(0.0)
                 step += 1
-        return Conversion(angles, rules, np.array(lengths))
+        return DecimalErrors(angles, rules, np.array(lengths))
 
-    def value(self, name: str, at: Mapping[str, Any]) -> _Value:
+    def value(self, name: str, at: Mapping[str, Any]) -> _ValueBound:
         """Return bounds on a joint's value and its rounding error, for values `at` of independent joints."""
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
-            return _Value(abs(at[name]), 0.0, 0.0, 0)
+            return _ValueBound(abs(at[name]), 0.0, 0.0, 0)
         m, c = abs(float(rule.get("multiplier", "1"))), abs(float(rule.get("offset", "0")))
         x = self.value(str(rule.get("joint")), at)
         error = m * x.error + 1.5 * m * (x.moved + x.offset) + c
-        return _Value(m * x.moved, m * x.offset + c, error, x.rules + 1)
+        return _ValueBound(m * x.moved, m * x.offset + c, error, x.rules + 1)
 
 
-class _Value(NamedTuple):
+class _ValueBound(NamedTuple):
     """Upper bounds on a joint's value M q + C and on the rounding error of this value.
 
     Attributes:

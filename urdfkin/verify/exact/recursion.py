@@ -53,7 +53,7 @@ def on_base(base: BaseNumbers) -> State:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class ExactMotion:
     """Position, velocity and acceleration, and Jacobian columns of each link in one sample, by link index."""
 
     states: Mapping[int, State]
@@ -69,7 +69,7 @@ def move(
     a: Iterable[Number],
     *,
     base: State | None = None,
-) -> Motion:
+) -> ExactMotion:
     """Return the motion of the links of `joints` in one sample; without `base`, the root link is fixed.
 
     `joints` is a result of `read_exact`. A joint comes after all joints on its path to the root.
@@ -107,31 +107,31 @@ def move(
                 for c, (k, turns) in enumerate(_FREE_AXES[kind])
             )
         states[i + 1], columns[i + 1] = moved, (*columns[joint.parent], *new)
-    return Motion(states, columns, tree.nv)
+    return ExactMotion(states, columns, tree.nv)
 
 
 # -- quantities of a frame, in the shapes that `Robot` returns -----------------------------------------
 
 
-def placement_values(motion: Motion, link: int) -> NDArray[np.object_]:
+def placement_values(motion: ExactMotion, link: int) -> NDArray[np.object_]:
     """Return the placement T_world_link (4, 4) of a link."""
     s = motion.states[link]
     return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
 
 
-def velocity_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+def velocity_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the velocity (6,) of a link, [linear; angular]."""
     s = motion.states[link]
     return _array(_RECURSION.in_reference(s, reference, *_RECURSION.velocity(s, reference)))
 
 
-def acceleration_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+def acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the classical acceleration (6,) of a link, [linear; angular]."""
     s = motion.states[link]
     return _array(_RECURSION.in_reference(s, reference, *_RECURSION.acceleration(s, reference)))
 
 
-def spatial_acceleration_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the spatial acceleration (6,) of a link, [linear; angular].
 
     The linear part at the frame's origin is the classical acceleration minus w x vel. In WORLD, the linear
@@ -145,19 +145,19 @@ def spatial_acceleration_values(motion: Motion, link: int, reference: Reference)
     return _array(_RECURSION.in_reference(s, reference, linear, s.alpha))
 
 
-def jacobian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+def jacobian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the Jacobian (6, nv) of a link."""
     found = _RECURSION.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
 
-def jacobian_rate_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the time derivative (6, nv) of a link's Jacobian."""
     found = _RECURSION.jacobian_rate(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
 
-def hessian_values(motion: Motion, link: int, reference: Reference) -> NDArray[np.object_]:
+def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
     """Return the Hessian (6, nv, nv) of a link."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
