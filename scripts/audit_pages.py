@@ -51,22 +51,17 @@ from urdfkin.validation.document import Document
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 ROOT = Path(__file__).parents[1]
-#: Folder of npm's packages axe-core and vnu-jar.
 TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
-#: Widths in pixels, and whether the theme is dark.
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
-#: Longest time (s) for axe-core to audit a page. A page of 100,000 elements takes half a minute.
+#: Time limit (s) of axe-core; a page of 100,000 elements takes half a minute.
 _AXE_SECONDS = 600
-#: Severities of violations that fail the audit; violations of other severities are only printed.
+#: Violations of other severities are printed only.
 IMPACTS = ("serious", "critical")
-#: JavaScript that unfolds everything on a page.
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: The script presses the Tab key `_PRESSES` times on a page, and draws `_PAGES` of the printed pages.
+#: Numbers of presses of the Tab key on a page, and of printed pages to draw.
 _PRESSES, _PAGES = 60, 12
-#: Errors of the HTML checker that the site's theme causes.
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: Options with which Chromium reports a mouse. The site's theme shows some elements only if the device has a
-#: mouse. The audit must test these elements too.
+#: Chromium reports a mouse, because the site's theme hides some elements without one.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -79,12 +74,12 @@ axe.run({ resultTypes: ["violations"] })
     v.nodes.slice(0, 3).map((n) => n.target.join(" ") + " " + n.html.slice(0, 160)),
   ])), (error) => done([["critical", "axe failed: " + error, 1, []]]));
 """
-#: JavaScript: return name, width and available width of each table that is wider than its box on the page.
+#: JavaScript that returns name, width and available width of each table that is wider than its box.
 _CUT = """const own = "body:not(:has(#robots, #history)) section > .scroll > table";  // the page of `same`
 return [...document.querySelectorAll(`#overview, .checks, #history, ${own}`)]
   .filter((t) => t.checkVisibility() && t.scrollWidth > t.parentElement.clientWidth)
   .map((t) => [t.id || t.className, t.scrollWidth, t.parentElement.clientWidth]);"""
-#: JavaScript: describe the element with the focus, and state whether an outline, border or shadow marks it.
+#: JavaScript that describes the element with the focus, and whether an outline or shadow marks it.
 _FOCUS = """
 let e = document.activeElement;
 if (!e || e === document.body) return null;
@@ -94,7 +89,7 @@ const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "non
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
 """
-#: JavaScript: return whether the border of the element with the focus changes if it loses the focus.
+#: JavaScript that returns whether the element with the focus changes its border without the focus.
 _BORDER = """
 const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
 setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
@@ -104,8 +99,6 @@ setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its name, its address, the code that prepares it, and the addresses that it may request."""
-
     name: str
     url: str
     prepare: str = ""
@@ -117,7 +110,6 @@ class Page:
 
 
 def axe_script() -> str | None:
-    """Return the source of axe, from npm or from the extra `test`; None if it is missing."""
     if (path := TOOLS / "axe-core" / "axe.min.js").is_file():
         return path.read_text("utf-8")
     found = util.find_spec("axe_core_python")
@@ -125,7 +117,6 @@ def axe_script() -> str | None:
 
 
 def html_checker() -> Path | None:
-    """Return the path of the Nu HTML checker; None if the checker or Java is missing."""
     path = TOOLS / "vnu-jar" / "build" / "dist" / "vnu.jar"
     return path if path.is_file() and shutil.which("java") else None
 
@@ -142,7 +133,6 @@ def disagreement() -> Document:
 
 
 def reports(folder: Path) -> dict[str, Callable[[], str]]:
-    """Return the name of each page of a report or comparison, and the function that makes it."""
     bad = folder / "broken.urdf"
     bad.write_text('<robot name="broken"><link name="a"/><link name="a"/><joint name="j"/></robot>')
     return {
@@ -167,10 +157,7 @@ def _history(folder: Path) -> str:
 
 
 def fleet_pages(folder: Path) -> Iterator[Page]:
-    """Yield the pages of a report of all robots: the overview, each robot's page, and one page with all.
-
-    The command writes a file for each robot beside the page. `to_html` returns one text.
-    """
+    """Yield the pages of a report of all robots: the page, a page for each robot, and one page with all."""
     document = validate(urdfkin.robots(), samples=1).as_dict()
     (folder / "fleet-robots").mkdir()
     texts = {**dict(as_files(document, "fleet.html")), "fleet-text.html": as_html(document)}
@@ -185,13 +172,11 @@ def fleet_pages(folder: Path) -> Iterator[Page]:
 
 
 def comparison(b: str, within: float | None) -> str:
-    """Return the page that compares the UR5 with another robot."""
     robots = urdfkin.load("ur5"), urdfkin.load(b)
     return same_page(same(*robots, within=within), robots, SameQuestion(within))
 
 
 def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
-    """Write the wanted pages of reports, comparisons and the site, and yield them."""
     for name, make in reports(folder).items():
         if wanted(name):
             path = folder / f"{name}.html"
@@ -205,7 +190,6 @@ def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
 
 
 def site(folder: Path) -> Iterator[Page]:
-    """Build the documentation site and yield some of its pages."""
     from mkdocs.commands.build import build  # noqa: PLC0415  of the extra `docs`
     from mkdocs.config import load_config  # noqa: PLC0415
 
@@ -221,7 +205,6 @@ def site(folder: Path) -> Iterator[Page]:
 
 @contextmanager
 def viewer(plays: bool = False) -> Iterator[Page]:
-    """Serve the viewer of a robot without meshes; if `plays` is True, add a trajectory to play."""
     from urdfkin.view.server import new_server  # noqa: PLC0415  of the extra `view`
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
@@ -242,7 +225,6 @@ def viewer(plays: bool = False) -> Iterator[Page]:
 
 
 def load(browser: Browser, page: Page) -> None:
-    """Open a page and wait until it is drawn."""
     browser.chrome.get("about:blank")  # otherwise a new fragment would not reload the page
     browser.chrome.get(page.url)
     if page.ready:
@@ -271,7 +253,6 @@ def scroll_through(browser: Browser) -> None:
 def look(
     browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
 ) -> list[str]:
-    """Return the faults of a page for one screen size."""
     where, faults = f"{width} {'dark' if dark else 'light'}", list[str]()
     browser.become(width, 844 if width < 600 else 1000, dark=dark)
     browser.requests()
@@ -298,14 +279,12 @@ def look(
 
 
 def _photograph(browser: Browser, path: Path, width: int, dark: bool, most: int = 6000) -> None:
-    """Save a picture of the whole page, up to a height of `most` pixels."""
     browser.become(width, min(most, browser.js("return document.documentElement.scrollHeight")), dark=dark)
     browser.settle()
     browser.chrome.save_screenshot(str(path))
 
 
 def walk(browser: Browser, page: Page) -> list[str]:
-    """Move through a page with the Tab key; return faults such as an invisible focus or a focus trap."""
     faults, seen = list[str](), list[str]()
     browser.become(1280, 1000)
     load(browser, page)
@@ -329,12 +308,11 @@ def walk(browser: Browser, page: Page) -> list[str]:
 
 
 def _border_changes(browser: Browser) -> bool:
-    """Return whether an element's border changes when the element has the focus. Wait for a transition."""
+    """Return whether the focus changes the border of an element, after a transition."""
     return bool(browser.chrome.execute_async_script(_BORDER))
 
 
 def html_errors(page: Page, jar: Path) -> list[str]:
-    """Return the messages of the Nu HTML checker about a file."""
     path = page.url.removeprefix("file://")
     done = subprocess.run(
         ["java", "-Xss4m", "-jar", str(jar), "--format", "json", "--errors-only", path],
@@ -349,7 +327,6 @@ def html_errors(page: Page, jar: Path) -> list[str]:
 
 
 def as_pdf(browser: Browser, page: Page) -> bytes:
-    """Return the page as it is printed on A4."""
     browser.become(1280, 1000)
     load(browser, page)
     a4 = {"printBackground": True, "paperWidth": 8.27, "paperHeight": 11.69}
@@ -357,7 +334,6 @@ def as_pdf(browser: Browser, page: Page) -> bytes:
 
 
 def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, jar: Path | None) -> list[str]:
-    """Return all faults of a page."""
     lines = list[str]()
     for width, dark in page.screens:
         lines += look(browser, page, width, dark, axe, output)
@@ -377,7 +353,6 @@ def audit(browser: Browser, page: Page, output: Path | None, axe: str | None, ja
 
 
 def main() -> None:
-    """Audit all pages, print their faults, and exit with 1 if there is one."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     only = "pages to audit, by the beginnings of their names: good, same, fleet, site, viewer"
     parser.add_argument("--only", nargs="*", default=[""], help=only)

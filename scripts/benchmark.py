@@ -39,8 +39,6 @@ SECTIONS = ("batch", "single", "checked", "verified", "where", "first", "joints"
 
 @dataclass(frozen=True)
 class Plan:
-    """Numbers of configurations, rounds, joints and frames that the benchmark measures."""
-
     configurations: int = 100_000  # number of configurations of a batch
     rounds: int = 21  # number of rounds of each table
     first: tuple[str, ...] = tuple(USES)  # quantities whose first use is measured
@@ -56,11 +54,7 @@ QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_
 
 
 def rows(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> Iterator[Row]:
-    """Time all contenders and yield the rows of all tables.
-
-    Raises:
-        DifferenceError: the results of two contenders differ.
-    """
+    """Yield the rows of all tables; raise DifferenceError if results of two contenders differ."""
     n, rounds = plan.configurations, plan.rounds
     ways: dict[str, Iterator[Row]] = {
         "batch": measured.batch_rows(n, contenders, rounds),
@@ -77,11 +71,6 @@ def rows(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -
 
 
 def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
-    """Measure everything and return it as data.
-
-    Raises:
-        DifferenceError: the results of two contenders differ.
-    """
     name, frame = SUBJECTS[0]
     found: dict[str, Any] = {
         "machine": machine(),
@@ -106,7 +95,6 @@ def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the benchmark; return 1 if results differ."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     option = parser.add_argument
     option("--quick", action="store_true", help="make a short run with few configurations and rounds")

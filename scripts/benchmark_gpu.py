@@ -60,14 +60,12 @@ _MEASURED = r"""    std::printf("{\"by\": \"urdfkin\", \"quantity\": \"@name@\",
 
 
 def nvcc() -> str | None:
-    """Return the path of CUDA's compiler: on the PATH, of `make nvcc`, or of a package here."""
     packages = Path(sysconfig.get_path("purelib"), "nvidia").glob("cu*/bin/nvcc")
     made = Path(sys.prefix, "nvcc", "bin")
     return shutil.which("nvcc") or shutil.which("nvcc", path=made) or next(map(str, sorted(packages)), None)
 
 
 def gpus() -> int:
-    """Return the number of GPUs that CUDA's driver finds."""
     try:
         driver, count = ctypes.CDLL("libcuda.so.1"), ctypes.c_int(0)
     except OSError:
@@ -105,8 +103,7 @@ def _filled(text: str, **values: object) -> str:
     return text
 
 
-def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
-    """Compile the program and the checks in both precisions; return the paths."""
+def compiled(code: Code, folder: Path, compiler: str) -> dict[str, Path]:
     header, source = folder / f"{code.name}.cuh", folder / "measure.cu"
     header.write_text(write(code, "cuda"), encoding="utf-8")
     source.write_text(program(code), encoding="utf-8")
@@ -122,12 +119,8 @@ def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
     return found
 
 
-def rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
-    """Yield the measurements, with configurations per second and the fraction of the memory bandwidth.
-
-    Raises:
-        ValueError: the first line is not the bandwidth.
-    """
+def rows(code: Code, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
+    """Yield the measurements, with configurations per second and the share of the memory's bandwidth."""
     found = [json.loads(line) for line in lines]
     if not found or "bandwidth" not in found[0]:
         raise ValueError("the program printed no bandwidth of the memory")
@@ -139,7 +132,6 @@ def rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
 
 
 def table(measured: Iterable[dict[str, Any]]) -> str:
-    """Return the measurements as a Markdown table."""
     heads = ("by", "quantity", "precision", "batch", "configurations/s", "share of bandwidth")
     rows = [
         (x["by"], x["quantity"], x["real"], f"{x['n']:,}", f"{x['a_second']:.3g}", f"{x['share']:.1%}")
@@ -148,14 +140,8 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
     return markdown(heads, rows, left=3)
 
 
-def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
-    """Yield the measurements of PyTorch's export, and of PyTorch Kinematics, as JSON lines.
-
-    There are none without PyTorch and its device.
-
-    Raises:
-        ValueError: a library computes a wrong number.
-    """
+def of_torch(robot: Robot, frame: str, code: Code, device: str = "cuda") -> Iterator[str]:
+    """Yield JSON lines of PyTorch's export and of PyTorch Kinematics; raise ValueError for a wrong number."""
     try:
         import torch  # noqa: PLC0415  optional
     except ModuleNotFoundError:
@@ -182,11 +168,7 @@ def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") ->
 
 
 def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
-    """Return the function of PyTorch Kinematics that computes the Jacobian's columns of the path.
-
-    Raises:
-        ValueError: it computes another Jacobian than `robot`.
-    """
+    """Return PyTorch Kinematics' Jacobian of the path; raise ValueError if it is not that of `robot`."""
     import pytorch_kinematics  # noqa: PLC0415  optional
     import torch  # noqa: PLC0415
 
@@ -223,7 +205,6 @@ def _seconds(call: Callable[[], Any], device: str) -> float:
 
 
 def main(words: list[str] | None = None) -> int:
-    """Measure, and print a table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     option = parser.add_argument
     option("robot", nargs="?", default="panda", help="path or name of a robot")

@@ -27,7 +27,6 @@ ROOT = Path(__file__).parents[1]
 
 
 def version() -> str:
-    """Return the version of the project; pyproject.toml is the only place that defines it."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     return str(project["version"])
 
@@ -58,7 +57,6 @@ def build(folder: Path) -> tuple[Path, Path]:
 
 
 def check_reproducible(files: tuple[Path, Path]) -> None:
-    """Build again, and fail if a byte differs."""
     with tempfile.TemporaryDirectory() as folder:
         for first, second in zip(files, build(Path(folder)), strict=True):
             if first.read_bytes() != second.read_bytes():
@@ -66,7 +64,6 @@ def check_reproducible(files: tuple[Path, Path]) -> None:
 
 
 def write_sbom(wheel: Path, target: Path, python: str | None) -> None:
-    """Write the SBOM of an environment; if no environment is given, make a new environment with the wheel."""
     with tempfile.TemporaryDirectory() as folder:
         if python is None:
             venv.create(folder, with_pip=True)
@@ -77,7 +74,6 @@ def write_sbom(wheel: Path, target: Path, python: str | None) -> None:
 
 
 def main() -> None:
-    """Build and check a release."""
     parser = argparse.ArgumentParser(description="Build and check the files of a release.")
     parser.add_argument("folder", type=Path, help="new or empty folder for the files of the release")
     parser.add_argument("--tag", help="tag of the release, such as v0.1.0")

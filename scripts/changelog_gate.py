@@ -36,7 +36,7 @@ def complaint(changed: Collection[str], messages: str) -> str | None:
 
 
 def git(root: Path, *words: str) -> str:
-    """Run git and return its output; raise CannotTellError if it fails."""
+    """Return git's output; raise CannotTellError if git fails."""
     try:
         done = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=True)
     except FileNotFoundError:
@@ -47,11 +47,7 @@ def git(root: Path, *words: str) -> str:
 
 
 def left_main(root: Path) -> str:
-    """Return the commit at which HEAD left main.
-
-    Raises:
-        CannotTellError: the commit HEAD is on main, main does not exist, or the clone is too shallow.
-    """
+    """Return the commit at which HEAD left main; raise CannotTellError if there is none."""
     head = git(root, "rev-parse", "HEAD").strip()
     for main in ("origin/main", "main"):
         try:
@@ -72,7 +68,6 @@ def changed_files(root: Path, base: str) -> set[str]:
 
 
 def main(root: Path = ROOT, base: str | None = None) -> int:
-    """Check the branch; return 1 if a line is missing, else 0."""
     try:
         base = base or left_main(root)
         problem = complaint(changed_files(root, base), git(root, "log", "--format=%B", f"{base}..HEAD"))

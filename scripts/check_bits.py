@@ -44,14 +44,13 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import bound_of
 
-#: Numbers of configurations of the tested batches. A block has eight configurations.
-#: The sizes are: part of a block, one block, a little more than a block, and many blocks and a remainder.
+#: Sizes of batches: part of a block of eight, one block, a little more, many blocks and a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
-#: Number of configurations, and number of frames, whose results the script stores.
+#: Numbers of configurations and of frames whose results are stored.
 KEPT, FRAMES = 9, 6
-#: Index of the configuration that is computed with Python numbers and with a compiled kernel.
+#: Index of the configuration that is computed in both ways.
 INTERPRETED = 3
 WAYS: tuple[Way, ...] = ("interpreted", "compiled")
 
@@ -69,7 +68,6 @@ class Subject:
 
     @classmethod
     def of(cls, name: str, stored: Arrays | None = None) -> Subject:
-        """Make a subject with the inputs and frames from a file, or with new inputs and frames."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # hide warnings about the robot's file
             robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)
@@ -96,7 +94,6 @@ class Subject:
         inputs: Sequence[Any],
         threads: int | None = None,
     ) -> FloatArray:
-        """Return the result of a method of the robot."""
         words = (frame, reference) if quantity.referred else (frame,)
         how = {} if threads is None else {"threads": threads}
         result: FloatArray = getattr(self.robot, quantity.method)(*inputs, *words, verify=False, **how)
@@ -111,9 +108,6 @@ def spread(count: int) -> list[int]:
 def same(x: FloatArray, y: FloatArray) -> bool:
     """Return whether two arrays have the same bits; 0 and -0 are different."""
     return x.shape == y.shape and x.tobytes() == y.tobytes()
-
-
-# -- single, prepared and in a batch ---------------------------------------------------------------------
 
 
 def differing(subject: Subject) -> Iterator[str]:
@@ -159,9 +153,6 @@ def differing_interpreted(subject: Subject) -> Iterator[str]:
             yield f"{what}: interpreted"
 
 
-# -- before and after ------------------------------------------------------------------------------------
-
-
 def given_of(subject: Subject, count: int) -> dict[str, Any]:
     """Return the inputs of the first configurations, and the frames, under the names of a file."""
     found = {f"{subject.name}/{x}": batch[:count] for x, batch in zip("qva", subject.inputs, strict=True)}
@@ -198,12 +189,11 @@ def share(what: str, now: Arrays, stored: Arrays) -> float:
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
-    # If the bits differ but the difference is 0, the two results are zeros of different signs.
+    # Zeros of different signs have other bits, but the difference 0.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 
 def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
-    """Compare a robot's results with stored results; return a text and the largest fraction of a bound."""
     shares = {what: share(what, now, stored) for what in now if what.count("/") == 2}
     others = {what: x for what, x in shares.items() if x}
     if not others:
@@ -216,9 +206,6 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
     )
 
 
-# -- enclosures ------------------------------------------------------------------------------------------
-
-#: Digits of the compared intervals: 15, and the default (None).
 _DIGITS = (15, None)
 
 
@@ -252,7 +239,6 @@ def nested(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the checks; return 1 if results differ unexpectedly."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     option = parser.add_argument
     option("robots", nargs="*", help="names of robots in the catalogue (default: all robots)")

@@ -49,7 +49,7 @@ from urdfkin.urdf.catalogue import examples
 
 PAGE = DOCS / "export.md"
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
-#: Compiled languages: the suffix of the file, the compilers, and their options.
+#: Compiled languages, each with its suffix, compilers and options.
 _COMPILED = (
     ("c", ".c", ("gcc", "clang"), _STRICT),
     ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])),
@@ -57,15 +57,13 @@ _COMPILED = (
 _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)
-#: Largest nv of a robot whose file for a library has a Hessian, to compare it with derivatives of the
-#: Jacobian: PyTorch's gradcheck computes the derivatives of each number. The files for any array library have
-#: it for each nv if they run in PyTorch. JAX compiles the stack of its numbers for minutes.
+#: Largest nv for a Hessian in a file for one library, because PyTorch's gradcheck differentiates each number.
+#: A file for any array library has it in PyTorch only, because JAX compiles its many numbers for minutes.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
 
-def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> FrameCode:
-    """Return the verified code of a frame."""
+def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> Code:
     return code_of_robot(robot, frame, quantities, "local_world_aligned", verify=True)
 
 
@@ -101,11 +99,7 @@ def _largest(found: Sequence[float], count: int) -> float:
 
 
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
-    """Yield robots and frames.
-
-    The main tip of each robot comes first. The other leaves follow in a fixed random order. A run that is
-    stopped early has then checked one frame of each robot, and a sample of the leaves.
-    """
+    """Yield the main tip of each robot, then the other leaves in a fixed random order."""
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
@@ -120,7 +114,6 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 
 def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
-    """Check the exported code of a frame; return the largest errors as fractions of their bounds."""
     wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:
         written = code(robot, frame, wanted)
@@ -130,7 +123,6 @@ def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
 
 
 def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
-    """Check every leaf or tip that has no stored result."""
     stored = {(line["robot"], line["frame"]) for line in lines_of(keep)}
     here: list[dict[str, Any]] = []
     for name, robot, frame in subjects(tips):
@@ -142,7 +134,6 @@ def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
 
 
 def check_library(library: str, environment: Path, package: str | None, keep: Path | None) -> int:
-    """Run the files of all tips in an environment that has PyTorch or JAX; return 1 if there is an error."""
     python = environment / "bin" / "python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", str(environment)], check=True)
@@ -184,14 +175,12 @@ def _files(library: str, folder: Path) -> Iterator[Path]:
 
 
 def lines_of(keep: Path | None) -> list[dict[str, Any]]:
-    """Return the stored results."""
     if keep is None or not keep.exists():
         return []
     return [json.loads(line) for line in keep.read_text(encoding="utf-8").splitlines()]
 
 
 def store(keep: Path | None, line: str) -> None:
-    """Print a result, and append it to the file of the stored results if there is one."""
     print(line, flush=True)
     if keep:
         with keep.open("a", encoding="utf-8") as file:
@@ -199,7 +188,6 @@ def store(keep: Path | None, line: str) -> None:
 
 
 def tell(lines: Sequence[dict[str, Any]]) -> int:
-    """Print a summary of the results; return 1 if there is an error."""
     wrong = [line for line in lines if not line["good"]]
     for line in wrong:
         print("WRONG", line)
@@ -216,7 +204,6 @@ def tell(lines: Sequence[dict[str, Any]]) -> int:
 
 
 def sizes() -> str:
-    """Return the sizes of the code for three frames and each quantity, as a Markdown table."""
     rows = []
     frames = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), (chain_urdf(100), "tip")
     for (source, frame), quantity in product(frames, QUANTITIES):
@@ -230,12 +217,10 @@ def sizes() -> str:
 
 
 def page(text: str) -> str:
-    """Return the page with the current table of sizes."""
     return inserted(text, sizes=sizes())
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the checks; return 1 for an error."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     option = parser.add_argument
     option("--keep", type=Path, help="file for the results, one per line; an existing file is continued")

@@ -45,7 +45,6 @@ from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import examples
 from urdfkin.verify.oracle import QueryBatch
 
-#: Number of configurations of each table.
 SAMPLES = 4
 #: Octave's symbolic package takes 20 s for six joints, so it only computes 6 tables with at most 4 joints.
 FEW, SMALL = 6, 4
@@ -82,8 +81,6 @@ Run = Callable[[Sequence[Job], Path], Poses]
 
 
 def in_python(form: str) -> Run:
-    """Run the Python formats in this interpreter."""
-
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
         library = form if form != "ets" else "roboticstoolbox"
         if importlib.util.find_spec(library) is None:
@@ -94,8 +91,6 @@ def in_python(form: str) -> Run:
 
 
 def elsewhere(form: str, interpreter: str) -> Run:
-    """Run the Python formats in another interpreter."""
-
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
         given, found = folder / "jobs.json", folder / "poses.json"
         data = [{"form": form, "text": export(job.table, form), "q": job.q.tolist()} for job in jobs]
@@ -107,7 +102,6 @@ def elsewhere(form: str, interpreter: str) -> Run:
 
 
 def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
-    """Compile the C format, with warnings as errors, and call its function."""
     compiler, found = _program("cc"), Poses()
     for k, job in enumerate(jobs):
         text, library = export(job.table, "c"), folder / f"code{k}.so"
@@ -124,13 +118,7 @@ def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
 
 
 def in_octave(form: str, lines_of: Callable[[str, Job], list[str]], first: str = "") -> Run:
-    """Run MATLAB's formats in Octave, all tables in one process.
-
-    Args:
-        form: Name of the format.
-        lines_of: Returns the statements that print the poses of a table, given its function.
-        first: Statements before all others.
-    """
+    """Run MATLAB's formats in one process of Octave; `lines_of` returns the lines that print poses."""
 
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
         octave, lines = _program("octave-cli"), [first]
@@ -172,8 +160,6 @@ def _as_bodies(name: str, job: Job) -> list[str]:
 
 
 def read_back(form: str) -> Run:
-    """Read exported tables back from the formats that urdfkin reads without loss."""
-
     def run(jobs: Sequence[Job], folder: Path) -> Poses:
         found, file = Poses(), folder / f"table.{form}"
         for job in jobs:
@@ -185,7 +171,6 @@ def read_back(form: str) -> Run:
 
 
 def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
-    """Load the URDF of a table and compute its poses."""
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
@@ -236,9 +221,6 @@ def _read(text: str) -> FloatArray:
     return np.array(text.split(), dtype=np.float64).reshape(-1, 4, 4)
 
 
-# -- tables of robots, and their differences from Pinocchio --------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Subject:
     """A table, its coordinates at some configurations, and Pinocchio's poses of its tip in its base."""
@@ -249,13 +231,11 @@ class Subject:
 
     @property
     def table(self) -> DHTable:
-        """The table of the job."""
         return self.job.table
 
     def off(self, found: FloatArray) -> tuple[float, float]:
         """Return the tip's distance from Pinocchio's (m), and the table's error as a share of its bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
-        # urdfkin and Pinocchio round differently.
         # A table without lengths still has rounding errors of its angles.
         allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
         return float(np.abs(found - self.theirs)[:, :3, 3].max()), float((apart / allowed).max())
@@ -272,7 +252,6 @@ def subjects(leaves: bool) -> Iterator[Subject]:
 
 
 def subject(robot: Robot, name: str, table: DHTable) -> Subject:
-    """Return one table of a robot with its configurations."""
     q = sample(robot.tree, SAMPLES, np.random.default_rng(0))
     ends = [table.base_frame, table.tip_frame]
     base, tip = np.moveaxis(robot.verifier.oracle().placements(QueryBatch(ends, (q,))), 1, 0)
@@ -291,7 +270,6 @@ def fits(form: str, table: DHTable) -> bool:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the checks; return 1 for an error."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--leaves", action="store_true", help="check every leaf link, not only the tips")
     parser.add_argument("--toolbox", metavar="PYTHON", help="Python interpreter that has roboticstoolbox")
@@ -312,7 +290,6 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _checked(form: str, found: Sequence[Subject], folder: Path) -> int:
-    """Print the results of an export format as one row; return the number of wrong exported tables."""
     begin = time.perf_counter()
     if form == "latex":
         return _compiled(found, folder)

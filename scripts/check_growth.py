@@ -48,7 +48,6 @@ def _filled(size: int, piece: str) -> str:
 
 
 def _many(piece: str, before: str = _LINK) -> Kind:
-    """Return robots with a text, and many copies of a piece after it."""
     return lambda size: _robot(before + _filled(size, piece))
 
 
@@ -168,8 +167,6 @@ KINDS: dict[str, Kind] = {
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The cost of a check."""
-
     megabytes: float  # size of the document
     seconds: float  # processor time
     memory: float  # largest growth of the process's memory in megabytes, including the memory of the findings
@@ -177,7 +174,6 @@ class Cost:
 
 
 def cost_of(kind: str, size: int) -> Cost:
-    """Check a document of a kind and about `size` bytes, in this process."""
     document = KINDS[kind](size)
     before, start = _peak(), time.process_time()
     findings = check_text(document, fold=False)
@@ -200,7 +196,6 @@ def _peak() -> float:
 
 
 def main() -> None:
-    """Print one Markdown row for each kind of content."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     option = parser.add_argument
     option("words", nargs="*", help="parts of the names of the kinds to measure (default: all)")

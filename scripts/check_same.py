@@ -36,8 +36,7 @@ from urdfkin.comparison.result import Interval, Sameness, Verdict
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
-#: Largest rounding error of a placement in a robot of some metres.
-#: The unit is metres for positions; entries of rotation matrices have no unit.
+#: Largest rounding error of a placement in a robot of some metres (m, and entries of a rotation).
 ROUNDING = 1e-10
 
 
@@ -60,11 +59,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 
 
 def _farthest(found: Sameness) -> Interval | None:
-    """Return the interval of the frame whose distance between the two robots is largest.
-
-    Frames that `same` reports as moved on their bodies are left out. The result is None if the interval has
-    no upper end.
-    """
+    """Return the finite interval of the largest distance between frames that did not move on their bodies."""
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
     stands = np.array_equal(found.base, np.eye(4))
@@ -99,7 +94,6 @@ def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
 
 
 def summary(some: list[dict[str, Any]]) -> Iterator[str]:
-    """Yield the lines of the summary for docs/same.md."""
     wrong = [one for one in some if not one["right"]]
     bounded = [one for one in some if "holds" in one]
     missed = [one for one in bounded if not one["holds"]]
@@ -120,7 +114,6 @@ def summary(some: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def main() -> int:
-    """Run the checks from the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("robots", nargs="*", help="names of robots in the catalogue (default: all robots)")
     parser.add_argument("--keep", type=Path, required=True, help="file for the results, one per line")

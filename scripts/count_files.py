@@ -21,7 +21,6 @@ from urdfkin.compiled.preload import only
 ROOT = Path(urdfkin.__file__).parent
 ROBOTS = Path(__file__).parents[1] / "robots"
 
-#: The two robots that the script reads if it is started without arguments.
 A, B = ROBOTS / "elbow.urdf", ROBOTS / "planar_two_link.urdf"
 
 
@@ -48,17 +47,12 @@ def files_run(call: Callable[[], object]) -> list[str]:
 
 
 def files_of_load(source: Path) -> list[str]:
-    """Return the files whose functions run during `load`."""
     load = urdfkin.load
     return files_run(lambda: load(source))
 
 
 def files_of_same(first: Path, second: Path) -> list[str]:
-    """Return the files whose functions run during `same`.
-
-    The forward recursion runs as a compiled kernel, and its files do not count. A first call compiles the
-    kernels if they are not on disk. It is not counted.
-    """
+    """Return the files whose functions run during `same`; a first call only compiles kernels."""
     same = urdfkin.same
     with only("compiled"):
         same(first, second)
@@ -66,7 +60,6 @@ def files_of_same(first: Path, second: Path) -> list[str]:
 
 
 def main(words: list[str]) -> None:
-    """Print the files and their number."""
     first, second = (*map(Path, words), *(() if words else (A, B)), None)[:2]
     counts = {"load": files_of_load(first)}
     if second is not None:

@@ -22,10 +22,7 @@ _DOCTEST = re.compile(r"^( *)>>> .*(?:\n *\S.*)*", re.MULTILINE)
 
 
 class Doctests(griffe.Extension):
-    """Adds code fences around doctests."""
-
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Change an object's docstring before it is parsed."""
         if obj.docstring is not None and obj.path.startswith("urdfkin.robot.Robot."):
             obj.docstring.value = inspect.getdoc(getattr(Robot, obj.name)) or ""
         if obj.docstring is not None:
@@ -33,6 +30,5 @@ class Doctests(griffe.Extension):
 
 
 def fenced(docstring: str) -> str:
-    """Return the docstring with each doctest in a code fence."""
     flat = _EXAMPLE.sub(lambda found: textwrap.indent(textwrap.dedent(found[2]), found[1]), docstring)
     return _DOCTEST.sub(r"\1```pycon\n\g<0>\n\1```", flat)

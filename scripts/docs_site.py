@@ -20,12 +20,10 @@ import urdfkin
 from urdfkin.cli import cli
 
 LESSONS = "lessons/"
-#: Pattern of the equation numbers in the first line of a docstring.
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
-#: Pages of the library. For each path: title, introduction, and names.
-#: Names of the package and names of methods of `Robot` have no path.
-#: The name of any other class has its full path.
+#: Title, introduction and names of each page of the library.
+#: Only a name outside the package `urdfkin` and the class `Robot` has its full path.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",
@@ -110,7 +108,6 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the pages generated from the program, and a notebook for each lesson."""
     from mkdocs.structure.files import File  # noqa: PLC0415  of the extra `docs`
 
     made = {"cli.md": commands_page(), "api.md": library_page()}
@@ -126,10 +123,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put displayed formulas on separate lines, and add the link to a lesson's notebook.
-
-    A picture follows the theme that the reader chooses on the site, not only the system's.
-    """
+    """Put displayed formulas on separate lines, let pictures follow the chosen theme, link the notebook."""
     markdown = _DISPLAYED.sub(r"\n$`\1`$\n", markdown)
     markdown = _PICTURE.sub(r'<img src="\2#only-light"\3><img src="\1#only-dark"\3>', markdown)
     if not page.file.src_uri.startswith(LESSONS):
@@ -139,7 +133,6 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def on_page_content(content: str, **_: Any) -> str:
-    """Convert formulas to MathML."""
     from latex2mathml.converter import convert  # noqa: PLC0415  of the extra `docs`
 
     def mathml(found: re.Match[str]) -> str:
@@ -164,10 +157,7 @@ def on_post_page(output: str, **_: Any) -> str:
 
 
 def notebook(page: str) -> dict[str, Any]:
-    """Convert a page to a notebook with text, code and the output on the page.
-
-    A test compares this output.
-    """
+    """Convert a page to a notebook with the outputs of the page, which a test compares."""
     cells: list[dict[str, Any]] = []
     at = 0
     for block in _FENCE.finditer(page):
@@ -196,7 +186,6 @@ def _cell(kind: str, source: str, **more: Any) -> dict[str, Any]:
 
 
 def library_page() -> str:
-    """Return the overview of the library: a table of names for each subject."""
     parts = ["# Library", "`import urdfkin`, then `urdfkin.load` a robot. Every example is run as a test."]
     for page, (title, words, names) in LIBRARY.items():
         parts += [f"## [{title}]({page})", words, "| Name | Purpose |\n|---|---|"]
@@ -208,7 +197,6 @@ def library_page() -> str:
 
 
 def subject_page(page: str) -> str:
-    """Return the page of one subject with the docstrings of its names."""
     title, words, names = LIBRARY[page]
     parts = [f"# {title}", words]
     for name in names.split():
@@ -234,7 +222,6 @@ def _short(name: str) -> str:
 
 
 def _purpose(name: str) -> str:
-    """Return the first sentence of a docstring."""
     module, _, own = address(name).rpartition(".")
     if module == _ROBOT:
         module, own = "urdfkin.robot", f"Robot.{own}"
@@ -246,7 +233,6 @@ def _purpose(name: str) -> str:
 
 
 def commands_page() -> str:
-    """Return the page of all commands with the text of `--help`."""
     parent = click.Context(cli, info_name="urdfkin", terminal_width=80, **cli.context_settings)
     parts = [
         "# Commands",

@@ -40,7 +40,6 @@ from scripts.fuzzing import GOOD, Case, mjcf, robots
 from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
-#: The message that a worker sends after it has compiled its kernels.
 READY, FIRST_WAIT = "ready", 300.0
 
 MUTANTS = "mutants"
@@ -49,13 +48,11 @@ FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES)
 
 @cache
 def files() -> list[Path]:
-    """Return the files of the robots to mutate."""
     paths = (entry.path for entry in catalogue().values())
     return [path for path in paths if path.stat().st_size <= LARGEST]
 
 
 def case(seed: int, family: str, number: int) -> Case:
-    """Return one document of a family."""
     if family in mjcf.FAMILIES:
         return mjcf.robot(seed, family, number)
     return mutant(seed, number, files()) if family == MUTANTS else robots.robot(seed, family, number)
@@ -85,7 +82,6 @@ class Worker:
         return str(word), str(details)
 
     def start(self) -> subprocess.Popen[str]:
-        """Start the process and wait until it has compiled its kernels."""
         pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         self.process = subprocess.Popen(self.command, **pipes, stderr=subprocess.DEVNULL, text=True)
         if _line(self.process, FIRST_WAIT).strip() != READY:
@@ -93,7 +89,6 @@ class Worker:
         return self.process
 
     def stop(self) -> int | None:
-        """Stop the process if it is running; return its exit status."""
         if self.process is None:
             return None
         process, self.process = self.process, None
@@ -105,11 +100,7 @@ class Worker:
 
 
 def _line(process: subprocess.Popen[str], seconds: float) -> str:
-    """Return the next line that a process writes; "" if it has ended.
-
-    Raises:
-        TimeoutError: there is no line within this time.
-    """
+    """Return the next line of a process, "" if it has ended; raise TimeoutError if there is none in time."""
     assert process.stdout is not None
     if not select.select([process.stdout], [], [], seconds)[0]:
         raise TimeoutError
@@ -133,7 +124,6 @@ def work(seed: int) -> None:
 def fuzz(
     asked: Iterable[tuple[str, int]], seed: int, jobs: int, timeout: float, keep: Path
 ) -> collections.Counter[str]:
-    """Test documents by family and number, store documents that fail, and return the counts of outcomes."""
     waiting = iter(list(asked))
     counts: collections.Counter[str] = collections.Counter()
 
@@ -159,17 +149,13 @@ def fuzz(
 
 
 def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
-    """Return (family, number) of all mutants and of all random robots.
-
-    The robots alternate between families.
-    """
+    """Return (family, number) of all mutants and of all random robots, which alternate between families."""
     chosen = [family for family in families if family != MUTANTS]
     asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
     return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]
 
 
 def main() -> int:
-    """Run the fuzzer from the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     option = parser.add_argument
     option("--mutants", type=int, default=2000, help="number of mutated files to test")

@@ -18,7 +18,6 @@ import psutil
 import urdfkin
 from urdfkin.compiled.preload import only
 
-#: Number of parts of a run. The memory in use is printed after each part.
 PARTS = 5
 _ROBOT = """<robot name="r{k}">
   <link name="base{k}"/><link name="arm"/><link name="{odd}tip{k}"/>
@@ -53,11 +52,8 @@ def usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    """Process n robots in batches.
-
-    After each batch, return the memory, the open descriptors and the number of objects.
-    """
-    # All kernels are loaded at first use. Otherwise a kernel that is loaded later would look like a leak.
+    """Process n robots in parts, and return the usage after each part."""
+    # All kernels are loaded first, because a kernel that is loaded later would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), only("compiled"):
         warnings.simplefilter("ignore")
         found = []
@@ -70,7 +66,6 @@ def measure(n: int) -> list[dict[str, float]]:
 
 
 def main() -> None:
-    """Print the measurements as JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robots", type=int, nargs="?", default=10_000)
     print(json.dumps(measure(parser.parse_args().robots)))

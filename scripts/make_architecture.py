@@ -28,7 +28,6 @@ PLAN = tomllib.loads((DOCS / "architecture.toml").read_text(encoding="utf-8"))
 
 #: For each foreign library: the module or the packages that may import it.
 IMPORTERS: dict[str, list[str]] = PLAN["importers"]
-#: Folders whose imports count.
 _TREES = ("urdfkin", "scripts", "examples")
 _NAMED = re.compile(r"(urdfkin(?:\.\w+)+)(?::[\w.]+)?")
 
@@ -41,13 +40,11 @@ class Package(NamedTuple):
     contents: str = ""
 
 
-#: The packages in order. A package imports only packages that come before it in this list.
 PACKAGES = [Package(**package) for package in PLAN["package"]]
 
 
 @cache
 def modules() -> dict[str, Path]:
-    """Return every module's path by its name."""
     files = [path.relative_to(ROOT) for tree in _TREES for path in sorted((ROOT / tree).rglob("*.py"))]
     return {".".join(path.with_suffix("").parts).removesuffix(".__init__"): ROOT / path for path in files}
 
@@ -89,7 +86,6 @@ def all_named() -> Mapping[str, frozenset[str]]:
 
 @cache
 def imports() -> Mapping[str, frozenset[str]]:
-    """Return the modules of this repository that each module imports."""
     known = modules()
     return {module: frozenset(_of_ours(names, known)) - {module} for module, names in all_named().items()}
 
@@ -105,10 +101,7 @@ def _of_ours(names: Iterable[str], known: Mapping[str, Path]) -> Iterator[str]:
 
 @cache
 def _reexported(package: str) -> frozenset[str]:
-    """Return the names that a package's `__init__` imports.
-
-    Such a name hides a submodule with the same name.
-    """
+    """Return the names that a package's `__init__` imports; such a name hides a submodule of this name."""
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
         return frozenset()
@@ -152,7 +145,6 @@ def arrows() -> set[tuple[str, str]]:
 
 
 def table() -> str:
-    """Return the packages as a Markdown table, in order."""
     rows = [(f"`{one.name}`", one.purpose, one.contents) for one in PACKAGES]
     return markdown(("Package", "Purpose", "Contents"), rows)
 
@@ -190,7 +182,6 @@ def picture() -> str:
 
 
 def page() -> str:
-    """Return docs/architecture.md with a current table."""
     return inserted(PAGE.read_text(encoding="utf-8"), packages=table())
 
 

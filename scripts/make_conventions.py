@@ -61,14 +61,12 @@ def _axis(xyz: str) -> str:
     return f'<axis xyz="{xyz}"/>'
 
 
-#: An arm with joints in reverse alphabetical order in the file.
 ARM = _robot(
     _joint("c", "revolute", "base", "l1", _axis("0 0 1")),
     _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
     _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
 )
-#: A robot that shows the order of coordinates.
-#: Two limbs are attached to the base, and a third limb is attached to the first limb.
+#: A robot that shows the order of coordinates: two limbs at the base, a third limb at the first.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -82,13 +80,11 @@ FOLLOWS = _robot(
     _joint("b", "revolute", "l1", "l2", '<mimic joint="a" multiplier="0.5" offset="0.1"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
-#: A continuous mimic joint after a revolute joint.
 UNLIKE = _robot(
     _joint("a", "revolute", "base", "l1"),
     _joint("b", "continuous", "l1", "l2", '<mimic joint="a"/>'),
     _joint("c", "revolute", "l2", "l3"),
 )
-#: Robots without masses and with negative masses.
 LIGHT, NEGATIVE = ARM.replace(_BODY, ""), ARM.replace('value="1"', 'value="-1"')
 #: MuJoCo's free joint connects a body to the world only.
 FREE = (
@@ -100,7 +96,6 @@ FREE_URDF = '<robot name="r"><link name="base"/><link name="l1"/>' + (
 )
 
 
-#: The tools in each table: libraries of kinematics in one table, simulators and formats in the other.
 _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
@@ -121,11 +116,7 @@ Readings = Mapping[str, FloatArray]
 
 
 def which(found: FloatArray, readings: Readings) -> str:
-    """Return the name of the only candidate definition that matches a result.
-
-    Raises:
-        ValueError: no definition matches, or several do.
-    """
+    """Return the name of the definition that matches a result; raise ValueError unless exactly one does."""
     named = [
         name for name, x in readings.items() if found.shape == x.shape and np.allclose(found, x, 1e-6, 1e-6)
     ]
@@ -160,8 +151,6 @@ class MeasuredMotion:
         mujoco.mj_rnePostConstraint(self.mj_model, self.mj_data)
         self.body = self.mj_model.body("l3").id
 
-    # The reference values are numerical derivatives of placements with respect to time.
-
     def path(self, t: float) -> FloatArray:
         """Return T_world_frame at time t, for q(t) = q + v t + a t^2 / 2."""
         return self.robot.placement(self.q + self.v * t + self.a * t * t / 2.0, "l3")
@@ -181,11 +170,7 @@ class MeasuredMotion:
         return R, T[0][:3, 3], rate[:3, 3], w, rate_2[:3, 3], alpha
 
     def velocity_readings(self) -> dict[str, FloatArray]:
-        """Return the frame's velocity according to each of six candidate definitions.
-
-        A definition states the order of the linear and the angular part (two choices), and the axes and the
-        reference point (three choices).
-        """
+        """Return the frame's velocity by six definitions: two orders of its parts, three points with axes."""
         R, p, v, w, _, _ = self.motion()
         points = {
             "of the frame's origin, in world axes": (v, w),
@@ -216,13 +201,11 @@ class MeasuredMotion:
 
 
 def rows() -> list[Row]:
-    """Return all rows of the table."""
     asked = MeasuredMotion()
     return [*_six_vectors(asked), _accelerations(asked), *_layout(), *_free()]
 
 
 def _six_vectors(asked: MeasuredMotion) -> Iterator[Row]:
-    """Yield the rows about velocities and Jacobians."""
     robot, readings, frame = asked.robot, asked.velocity_readings(), (asked.model, asked.data, asked.frame)
     for name, local in (("local_world_aligned", 0), ("local", 1), ("world", None)):
         theirs = pin.getFrameVelocity(*frame, getattr(pin, name.upper())).vector
@@ -287,7 +270,6 @@ def _order(names: Iterable[str]) -> str:
 
 
 def _layout() -> Iterator[Row]:
-    """Yield the rows about coordinates, mimic joints, and links without a possible mass."""
     limbs, turns, follows = (mujoco.MjModel.from_xml_string(text) for text in (LIMBS, TURNS, FOLLOWS))
     data = mujoco.MjData(follows)
     data.qpos[:] = 0.7, 0.0, 0.0
@@ -341,7 +323,6 @@ def _readers(text: str) -> tuple[str, str, str]:
 
 
 def _free() -> Iterator[Row]:
-    """Yield the two rows of the table about a free body: the order of q, and the axes of v."""
     rng = np.random.default_rng(1)
     xyzw = rng.normal(size=4)
     xyzw /= np.linalg.norm(xyzw)
@@ -387,14 +368,12 @@ def _free() -> Iterator[Row]:
 
 
 def _table(names: tuple[str, ...]) -> str:
-    """Return a table with a column for each convention."""
     columns = [_cells(find_convention(name)) for name in names]
     heads = ["", *(f"{find_convention(name).title} (`{name}`)" for name in names)]
     return table(heads, [(what, *(column[what] for column in columns)) for what in columns[0]])
 
 
 def _cells(how: Convention) -> dict[str, str]:
-    """Return the cells of a convention, one for each row of the table."""
     order = "no known rule" if how.order == "given" else how.order.replace("file", "place in the file")
     order = {"name": "by name", "place in the file": "that of the file"}.get(order, order)
     parts = ["x, y, z", f"q{', q'.join(how.quaternion)}"]
@@ -422,7 +401,6 @@ def _cells(how: Convention) -> dict[str, str]:
 
 
 def measure() -> None:
-    """Run the installed libraries on the catalogue, and write the results to conventions.toml."""
     from tests.model.conventions.libraries import LIBRARIES  # noqa: PLC0415  needs pytest
 
     for name, library in LIBRARIES.items():
@@ -469,7 +447,6 @@ def _address(source: str) -> str:
 
 
 def page() -> str:
-    """Return the text of the page."""
     heads = ("", "urdfkin", f"Pinocchio {pin.__version__}", f"MuJoCo {mujoco.__version__}")
     tools = "\n\n".join(map(_table, _TABLES))
     return inserted(PAGE.read_text("utf-8"), measured=table(heads, rows()), tools=tools)

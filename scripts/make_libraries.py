@@ -36,19 +36,14 @@ from urdfkin.verify.adapters import LIBRARIES
 
 PAGE, FIGURES, LISTED = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json", "toml"))
 DATA: dict[str, Any] = tomllib.loads(LISTED.read_text("utf-8"))
-#: The features of the table, by name.
 FEATURES = {name: features()[name] for name in DATA["features"]}
-#: Number of random configurations for which each feature is tested.
 CONFIGURATIONS = 3
 #: Largest difference (m, and entries of a rotation matrix) of a pose that counts as right.
-#: For these robots, libraries that compute in double precision differ by less than 1e-14.
-#: A misread element causes a difference of more than 1e-3.
+#: Libraries in double precision differ by less than 1e-14, and misread elements by more than 1e-3.
 RIGHT = 1e-9
-#: Time limit (seconds) for a library to read all features.
-#: After a crash or a timeout, the limit begins again for the remaining features.
+#: Time limit (s) for all features; it begins again after a crash or a timeout.
 _SECONDS = 60
 _QUOTED = 160
-#: For each verdict about a cell: the title of its row of sums.
 VERDICTS = {
     "right": "right",
     "wrong": "different, without an error",
@@ -71,10 +66,7 @@ def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
 
 
 def cell(feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the table's cell for a feature and a library.
-
-    The cell has a verdict, and the largest difference or a message.
-    """
+    """Return a verdict, and the largest difference or a message."""
     if "error" in answer:
         return {"verdict": "refused", "message": answer["error"][:_QUOTED]}
     if any("tip" not in theirs for theirs in answer["poses"]):
@@ -112,10 +104,7 @@ def environment(folder: Path, library: str) -> Path:
 
 
 def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a library's answer to each case.
-
-    After a case that ends the library's process, start a new process.
-    """
+    """Yield a library's answer to each case; after a case that ends its process, start a new process."""
     todo = list(cases)
     while todo:
         try:
@@ -159,7 +148,6 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
-    """Return the page with the cells, the stated differences, the features and the reasons."""
     cells, versions = figures["cells"], figures["versions"]
     notes = _documented(figures)
     letters = {id(one): chr(ord("a") + i) for i, one in enumerate(notes)}
@@ -205,7 +193,6 @@ def _documented(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _reasons(cells: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Yield a library, its features and the message or note that they have in common."""
     for library, column in cells.items():
         reasons: dict[str, list[str]] = {}
         for feature, one in column.items():
@@ -218,7 +205,6 @@ def _reasons(cells: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
 
 
 def main() -> None:
-    """Install and run the libraries, and write the page and the JSON file."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     names, folder = list(DATA["versions"]), platformdirs.user_cache_path("urdfkin-libraries")
     parser.add_argument("libraries", nargs="*", choices=[*names, []], help="libraries; by default all")

@@ -46,11 +46,8 @@ from urdfkin.verify.pinocchio import version
 
 
 def _cell(text: str) -> str:
-    """Escape a text for a cell of a Markdown table."""
     return text.replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*")
 
-
-# -- findings ----------------------------------------------------------------------------------------------
 
 FAMILIES = {
     "1": "Text and XML",
@@ -62,7 +59,7 @@ FAMILIES = {
     "7": "Inertials, geometry and materials",
 }
 
-#: For each code: what the warning means for the robots of the catalogue that have it.
+#: The meaning of each warning for the robots of the catalogue that have it.
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
@@ -74,7 +71,7 @@ REMARKS = {
     "URDF708": "Only a colour is missing.",
 }
 
-#: For each option of `check`: the limit that it raises, and the words about it.
+#: For each option of `check`: the limit that it raises, and its unit.
 LIMITS = {
     "--max-bytes": (DEFAULT_LIMITS.bytes, "bytes"),
     "--max-depth": (DEFAULT_LIMITS.depth, "levels of nesting"),
@@ -88,7 +85,6 @@ LIMITS = {
 
 
 def findings() -> dict[str, str]:
-    """Return the limits, the codes, and the warnings of the robots in the catalogue."""
     limits = [
         (f"{limit:,} {words}", f"`{option}`" if option else "") for option, (limit, words) in LIMITS.items()
     ]
@@ -125,15 +121,10 @@ def _warnings() -> Iterator[tuple[str, ...]]:
 
 
 def warnings_of(robot: str) -> list[Finding]:
-    """Return the warnings and errors of a robot of the catalogue."""
     return [finding for finding in check(robot, fold=True) if finding.severity is not Severity.NOTE]
 
 
-# -- reports -----------------------------------------------------------------------------------------------
-
-
 def reports() -> dict[str, str]:
-    """Return the layout of the JSON report, from its schema."""
     whole = VALIDATION.schema()
     parts = {"The document": whole, **{f"`{name}`": part for name, part in whole["$defs"].items()}}
     return {"layout": "\n".join(_layout(title, part) for title, part in parts.items())}
@@ -166,9 +157,6 @@ def _meaning(entry: dict[str, Any]) -> str:
     return str(entry.get("description") or VALIDATION.schema()["$defs"][name]["description"])
 
 
-# -- the accuracy study ------------------------------------------------------------------------------------
-
-#: Name and kind of each robot of the accuracy study.
 STUDIED = {
     "panda": "arm with seven joints, gripper with a mimic joint",
     "ur5": "arm with six-digit angles",
@@ -182,14 +170,12 @@ STUDIED = {
     "so100": "hobby arm, skew axes",
     "polar": "polar robot of the textbook",
 }
-#: Robots that are also studied on a moving base.
 MOVING = ("talos", "anymal", "ur5")
 #: Numbers of samples of each robot in the accuracy study and in the table of enclosures.
 SAMPLES, ENCLOSED = 10, 5
 
 
 def study() -> dict[str, str]:
-    """Run the accuracy study, and return the parts of its page."""
     judgements = {
         f"{name}: {kind}": judge(urdfkin.load(name), samples=SAMPLES) for name, kind in STUDIED.items()
     }
@@ -200,7 +186,6 @@ def study() -> dict[str, str]:
 
 
 def study_parts(judgements: dict[str, Judgement]) -> dict[str, str]:
-    """Return the parts of the page of an accuracy study: the counts, and a table for each robot."""
     lines = [line for judgement in judgements.values() for line in plain(judgement)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
@@ -227,16 +212,12 @@ def _errors(lines: tuple[AccuracyLine, ...]) -> str:
     return table(("quantity", "reference", "numbers", *sides), rows, left=2)
 
 
-# -- enclosures --------------------------------------------------------------------------------------------
-
 #: Robots whose enclosures are measured: arms, a hand with mimic joints, humanoids, a quadruped, a hobby arm.
 PROVEN = ("panda", "ur5", "xarm7", "allegro_left_hand", "talos", "icub", "anymal", "so100")
-#: Numbers of joints of the chains with oblique axes.
 LENGTHS = (3, 10, 30, 100)
 
 
 def enclosures() -> dict[str, str]:
-    """Measure the width of the intervals of robots and of long chains."""
     heads = ("robot", "joints", "digits", "widest, steps", "urdfkin inside", "Pinocchio inside", "ms")
     long = ("joints", "digits", "acceleration", "widest interval", "ms")
     with only("compiled"):
@@ -290,10 +271,7 @@ def _largest(part: Enclosure) -> float:
 
 
 def _inside(parts: list[Enclosure], side: str) -> str:
-    """Return the fraction of a library's numbers that lie in their proven intervals.
-
-    Numbers with an interval of width 0 are left out.
-    """
+    """Return the share of a library's numbers in their proven intervals, without intervals of width 0."""
     found = [part.contains(getattr(part, side))[part.width > 0.0] for part in parts]
     return f"{np.concatenate(found).mean():.0%}"
 
@@ -309,9 +287,6 @@ def askew(length: int) -> str:
     return f'<robot name="askew"><link name="l0"/>{joints}</robot>'
 
 
-# -- all pages ---------------------------------------------------------------------------------------------
-
-#: For each page: the function that returns its generated parts.
 PARTS: dict[str, Callable[[], dict[str, str]]] = {
     "findings": findings,
     "reports": reports,
@@ -323,12 +298,10 @@ FIGURES, PICTURE = DOCS / "performance.json", DOCS / "images" / "performance.svg
 
 
 def path_of(name: str) -> Path:
-    """Return the path of a page."""
     return DOCS / f"{name}.md"
 
 
 def page(name: str) -> str:
-    """Return the text of a page with current parts. The page of the equations is generated as a whole."""
     if name == "equations":
         return equations()
     text = path_of(name).read_text("utf-8")
@@ -338,7 +311,6 @@ def page(name: str) -> str:
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Write the pages."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("pages", nargs="*", choices=[*PAGES, []], metavar="PAGE", help="default: all pages")
     for name in parser.parse_args(words).pages or PAGES:

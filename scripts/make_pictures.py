@@ -30,12 +30,10 @@ from urdfkin.view.server import new_server
 from urdfkin.view.viewer import Viewer
 
 POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
-#: For each suffix of a screenshot's file name: whether the screenshot has the dark theme.
 THEMES = (("", False), ("-dark", True))
 
 
 def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
-    """Draw two axes in red and green."""
     for k, color in enumerate((VERMILION, GREEN)):
         arrow(axes, at, 0.17 * R[:, k], color)
         place = at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]
@@ -61,7 +59,6 @@ def reference_frames() -> Any:
         _axes(axes, at, R)
         numbers = arm.velocity(q, v, "tip", reference)[:2]
         arrow(axes, at, 0.6 * R @ numbers, INK)
-        # draw the two components of the arrow, along the two axes
         for k, color in enumerate((VERMILION, GREEN)):
             begin = at + (0.6 * R[:, 0] * numbers[0] if k else 0)
             ends = np.array([begin, begin + 0.6 * R[:, k] * numbers[k]])
@@ -121,7 +118,6 @@ def keep(browser: Browser, name: str) -> None:
 
 
 def main() -> None:
-    """Make all pictures."""
     with mpl.rc_context(STYLE):
         figure = reference_frames()
         figure.savefig(IMAGES / "reference-frames.svg", metadata={"Date": None})

@@ -48,13 +48,11 @@ STYLE: Any = {
 
 
 def arrow(axes: Any, start: FloatArray, vector: FloatArray, color: str, label: str | None = None) -> None:
-    """Draw an arrow in the plane, in data units."""
     units: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1}
     axes.quiver(*start, *vector, color=color, width=0.007, zorder=4, label=label, **units)
 
 
 def plane(axes: Any, title: str) -> None:
-    """Set equal scales, a grid, and axis labels in metres."""
     axes.grid(color="#e6eaee", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.set(aspect="equal", title=title, xlabel="x0 [m]", ylabel="y0 [m]")
@@ -98,17 +96,13 @@ def velocity_field(figure: Any) -> None:
 
 
 def draw_frame(axes: Any, R: FloatArray, size: float, names: str) -> None:
-    """Draw three axes in red, green and blue."""
     for i, color in enumerate(AXES):
         axes.quiver(0, 0, 0, *(size * R[:, i]), color=color, arrow_length_ratio=0.12, linewidth=2.2)
         axes.text(*(1.16 * size * R[:, i]), f"{names}{'xyz'[i]}", color=color, ha="center", va="center")
 
 
 def turning(first: int, second: int) -> Callable[[float], FloatArray]:
-    """Return the angular velocity w(t) of a rotation about one axis of frame 0 and then about another axis.
-
-    Each of the two rotations is a quarter turn in one second.
-    """
+    """Return w(t) of a quarter turn in one second about one axis of frame 0, then about another."""
     return lambda t: np.pi / 2 * np.eye(3)[first if t < 1.0 else second]
 
 
@@ -132,10 +126,7 @@ def integral_of_w(figure: Any) -> None:
 
 
 def euler_singularity(figure: Any) -> None:
-    """Plot the condition number of Omega against the middle angle, for ZYZ and roll-pitch-yaw.
-
-    The matrix Omega converts the rates of the angles to an angular velocity.
-    """
+    """Plot the condition number of Omega, from angle rates to angular velocity, against the middle angle."""
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, dashes, label in (("ZYZ", BLUE, "-", "ZYZ"), ("xyz", ORANGE, "--", "roll, pitch, yaw")):
@@ -267,7 +258,6 @@ PICTURES: dict[str, tuple[Callable[[Any], None], tuple[float, float]]] = {
 
 
 def main(folder: Path = IMAGES) -> None:
-    """Draw all pictures."""
     folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):
         for name, (draw, size) in PICTURES.items():

@@ -30,7 +30,6 @@ from urdfkin.validation.store import opened
 
 
 def store(*robots: Any, **how: Any) -> ValidationReport:
-    """Validate serially, with a store."""
     with tempfile.TemporaryDirectory() as folder:
         report = validate(*robots, store=folder, **how)
         files = [path.stat().st_size for path in Path(folder).glob("chunks/*/*")]
@@ -61,7 +60,6 @@ WAYS: dict[str, Callable[..., ValidationReport]] = {
 
 
 def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> None:
-    """Validate robots in several ways, and print the times."""
     validate("planar_two_link", samples=10)  # compile and load all kernels before the measurement
     wall: dict[str, list[float]] = {name: [] for name in ways}
     processor: dict[str, list[float]] = {name: [] for name in ways}
@@ -110,7 +108,6 @@ def _cost(work: Callable[[int], object], times: int = 100) -> float:
 
 
 def main() -> None:
-    """Print the measurements."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("robots", nargs="*")
     parser.add_argument("--all", action="store_true", help="the robots of example-robot-data")

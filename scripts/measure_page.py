@@ -38,7 +38,6 @@ _UNFOLD = """
 
 
 def main() -> None:
-    """Print the time of each step."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--robots", type=int, default=2000)
     parser.add_argument("--rounds", type=int, default=5)
@@ -59,7 +58,6 @@ def main() -> None:
 
 
 def fleet(robots: int) -> Document:
-    """Return the report document of `robots` robots."""
     document = validate(list(_ROBOTS), samples=10).as_dict()
     names = (f"fleet/{i:04}.urdf" for i in range(robots))
     document["robots"] = [

@@ -30,16 +30,7 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "descriptions", "cluster")
 
 
 def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
-    """Return the sizes in bytes of a package and of the packages that it needs.
-
-    Args:
-        name: A package.
-        extras: Extras of the package that are included.
-        without: A package to leave out, together with all packages that only this package needs.
-
-    Raises:
-        PackageNotFoundError: a package is not installed.
-    """
+    """Return the sizes in bytes of a package and its needs, without those that only `without` needs."""
     found: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()
     waiting = [(name, frozenset(extras))]
@@ -78,7 +69,6 @@ def installed_extras(core: dict[str, int]) -> dict[str, tuple[int, int]]:
 
 
 def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tuple[int, int]]) -> str:
-    """Return the text of the page: the sizes of the core, of the core without yourdfpy, and of the extras."""
     total, meshes = sum(core.values()), sum(core.values()) - sum(lean.values())
     robots, pinocchio = core["example-robot-data"], sum(closure("pin").values())
     text = (
@@ -94,7 +84,6 @@ def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tupl
 
 
 def main() -> None:
-    """Print the largest packages, the sums and the extras, and write the page."""
     parser = argparse.ArgumentParser(description="Measure the size of an installation.")
     parser.add_argument("--print", action="store_true", help="print the sizes, and do not write the page")
     only_print = vars(parser.parse_args())["print"]

@@ -36,8 +36,6 @@ BASE = ("-c", "import numpy, pinocchio")
 
 @dataclass(frozen=True)
 class Row:
-    """A process to measure."""
-
     what: str  # name of the process on the page
     #: Arguments of the interpreter; ROBOT stands for a URDF that is not in the catalogue.
     words: tuple[str, ...]
@@ -48,7 +46,6 @@ class Row:
 
     @property
     def median(self) -> float:
-        """Median of the measured times, seconds."""
         return statistics.median(self.seconds)
 
 
@@ -68,12 +65,7 @@ def rows() -> list[Row]:
 
 
 def seconds(words: Sequence[str], cache: str | None) -> float:
-    """Return the processor time of a process and its children.
-
-    Args:
-        words: Arguments of the interpreter.
-        cache: Cache folder for kernels; None: the cache folder of the user.
-    """
+    """Return the processor time of a process and its children; `cache` is a folder for kernels."""
     environ = {name: x for name, x in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     environ["PYTHONPATH"] = str(ROOT)
     if cache is not None:
@@ -85,10 +77,7 @@ def seconds(words: Sequence[str], cache: str | None) -> float:
 
 
 def measured(rounds: int, folder: Path) -> list[Row]:
-    """Return the rows with their measured times.
-
-    An additional first round writes the bytecode and is not counted.
-    """
+    """Return the rows with their times; an additional first round writes the bytecode and does not count."""
     found, robot = rows(), folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())
     for k in range(rounds + 1):
@@ -101,7 +90,6 @@ def measured(rounds: int, folder: Path) -> list[Row]:
 
 
 def table(found: Sequence[Row]) -> str:
-    """Return the table of the page."""
     base = found[0].median
     rows = [
         (row.what, f"{row.median:.2f}", f"{row.median / base:.2f}", f"{row.most:.1f}" if row.most else "")
@@ -111,13 +99,11 @@ def table(found: Sequence[Row]) -> str:
 
 
 def missed(found: Sequence[Row]) -> list[str]:
-    """Return the names of the rows whose time exceeds its limit."""
     base = found[0].median
     return [row.what for row in found if row.most is not None and row.median > row.most * base]
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Measure and write the page; return 1 if a time exceeds its limit."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--rounds", type=int, default=11, help="number of processes for each row")
     given = parser.parse_args(words)

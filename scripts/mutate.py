@@ -42,9 +42,8 @@ PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # pytest's exit code if no test was collected
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
 
-# -- the files, their tests, and the lists of mutants ------------------------------------------------------
 
-#: Numba compiles these files from their source, so a mutant made on import has no effect.
+#: Numba compiles the source of these files, so a mutant made on import has no effect.
 #: tests/laws/test_mutation.py mutates them without the compiler.
 COMPILED = {
     "compiled/machine/kernels.py", "compiled/machine/memory.py", "compiled/machine/numbers.py",
@@ -53,17 +52,12 @@ COMPILED = {
 }  # fmt: skip
 
 
-#: Tests that make their own mutants in separate processes.
 _OF_SLIPS = ("test_mutate", "test_named_slips")
 _OF_ROBOTS = ("test_robot.py", "verify", "laws")
 
 
 def files(parts: list[str]) -> list[Path]:
-    """Return the package's files, or only the files whose path in the package begins with one of the parts.
-
-    Raises:
-        ValueError: no path begins with one of the parts.
-    """
+    """Return the package's files below one of the parts; raise ValueError if a part has no file."""
     found = sorted(path for path in PACKAGE.rglob("*.py") if _below(path) not in COMPILED)
     for part in parts:
         if not any(_below(path).startswith(part) for path in found):
@@ -81,10 +75,7 @@ def _below(path: Path) -> str:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Return the tests near a module: first the tests that mention the module, then the tests of its package.
-
-    If a part of the package has no tests of its own, the tests of all other parts are returned.
-    """
+    """Return the tests that mention a module, then the tests of its package or of the whole robot."""
     package, _, name = module_of(path).rpartition(".")
     named = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
@@ -112,8 +103,6 @@ def _texts() -> dict[Path, str]:
 
 @dataclass(frozen=True)
 class Named:
-    """One named mutant."""
-
     claim: str  # the mistake that must be detected
     module: str  # the module, such as `urdfkin.validation.error_stats`
     before: str  # a text that occurs exactly once in the module
@@ -122,13 +111,11 @@ class Named:
 
     @property
     def file(self) -> Path:
-        """Path of the module's file."""
         path = ROOT / self.module.replace(".", "/")
         return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 
 
 def named_slips() -> list[Named]:
-    """Return the mutants of tests/attacks/named_slips.toml."""
     text = (TESTS / "attacks" / "named_slips.toml").read_text(encoding="utf-8")
     return [Named(**slip) for slip in tomllib.loads(text)["slip"]]
 
@@ -142,9 +129,6 @@ def argued() -> dict[tuple[str, str], str]:
     """Return the reason of each harmless mutant, by its function and its text."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     return {(found["place"], found["what"]): found["why"] for found in _ARGUMENT.finditer(page)}
-
-
-# -- mutants, and the tests that must detect them ---------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -168,12 +152,10 @@ class Outcome:
 
 
 def mutants(parts: list[str]) -> list[Mutant]:
-    """Return all mutants of some parts of the package, or of the whole package."""
     return [mutant for path in files(parts) for mutant in mutants_of(path)]
 
 
 def mutants_of(path: Path) -> list[Mutant]:
-    """Return all mutants of a file."""
     tree, module = ast.parse(path.read_text(encoding="utf-8")), module_of(path)
     return [
         Mutant(
@@ -209,8 +191,7 @@ def judge_named(slip: Named, *, timeout: float) -> Outcome:
     return Outcome(mutant, word, by)
 
 
-#: A server that forks a process for each run of tests.
-#: The server has already imported the foreign libraries, which takes longer than most tests.
+#: This server imports the foreign libraries once, which takes longer than most tests.
 _READY = multiprocessing.get_context("forkserver")
 _READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 
@@ -252,7 +233,6 @@ def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
 
 
 def main() -> int:
-    """Run the mutation tests from the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     option = parser.add_argument
     option("parts", nargs="*", help="prefixes of paths below urdfkin/, such as dh/ (default: all files)")

@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-#: For each pattern: the plain form.
 #: In a blind test, a reader did not understand sentences with these patterns.
 PLAIN = {
     r"\bwitness(es)?\b": "oracle",
@@ -43,7 +42,6 @@ PLAIN = {
     r"\bwhat people (read|ask|write)\b": "a noun: printed text, questions, input",
     r"\b(is|are) said (to be|up to|of|by)\b": "is reported, is stated",
 }
-#: A sentence with more words than this number is too long.
 LONGEST = 30
 _SUFFIXES = (".py", ".md", ".toml")
 _SKIPPED = {".venv", ".git", "site", "node_modules", "build", "dist", "data"}
@@ -51,8 +49,6 @@ _FILES_SKIPPED = {"CHANGELOG.md", "plain_words.py"}
 
 
 class Passage(NamedTuple):
-    """A piece of text for people, such as a line of a page, a docstring or a comment."""
-
     file: str  # the file, relative to the repository
     line: int  # first line of the passage
     text: str  # words of the passage
@@ -78,7 +74,6 @@ def passages(path: Path) -> Iterator[Passage]:
 
 
 def files(paths: list[Path]) -> Iterator[Path]:
-    """Yield the files that people read, in the given folders and files."""
     for path in paths:
         for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
             parts = file.relative_to(ROOT).parts
@@ -99,7 +94,6 @@ def complaints(paths: list[Path]) -> list[str]:
 
 
 def long_sentences(paths: list[Path]) -> list[str]:
-    """Return a line for each sentence of more than `LONGEST` words."""
     found = []
     for file in files(paths):
         for passage in passages(file):

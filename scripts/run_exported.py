@@ -69,7 +69,6 @@ def of_hessian(scope: dict[str, Any], array: Callable[..., Any], slopes: Callabl
 
 
 def of_compiled(scope: dict[str, Any]) -> float:
-    """Compile the functions with `torch.compile`. Return their largest error divided by its bound."""
     import torch  # noqa: PLC0415
 
     found = 0.0
@@ -98,7 +97,6 @@ def worst(found: Any, true: Any, within: Any, eps: float) -> float:
 
 
 def main(library: str, paths: list[str]) -> None:
-    """Print a line for each file: its name, the library, and the largest share of each check."""
     compiled = True
     for path in paths:
         found: dict[str, float] = {}

@@ -102,7 +102,6 @@ _SHORT = {
     "equivalent": "equivalent",
     "not compared": "not readable",
 }
-#: Longest quotation of a converter's message, in characters.
 _QUOTED = 120
 #: Settings with which MuJoCo accepts bodies without mass, or with an impossible inertia.
 _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true"}
@@ -113,11 +112,7 @@ class RefusalError(Exception):
 
 
 def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
-    """Return the file that a tool reads for a URDF, and the file that it writes.
-
-    Raises:
-        RefusalError: the tool, or the one that writes its source, refuses the robot; with its message.
-    """
+    """Return the file that a tool reads for a URDF, and the file that it writes; or raise RefusalError."""
     reads, program, writes = TOOLS[tool]
     source = converted(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
@@ -135,11 +130,7 @@ def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -
 
 
 def _compared(tool: str, pythons: Mapping[str, str], name: str) -> tuple[str, Sameness]:
-    """Return the number of moving joints of a robot, and the comparison of a tool's source and result.
-
-    Raises:
-        RefusalError: the robot is not converted, or not compared; the message has the reason.
-    """
+    """Return the number of moving joints, and the comparison of source and result; or raise RefusalError."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         robot = urdfkin.load(name)
@@ -171,11 +162,9 @@ def _without_shapes(urdf: str, folder: Path) -> Path:
 
 
 def row_of(tool: str, pythons: Mapping[str, str], name: str) -> list[str]:
-    """Return the row of a robot: name, joints, verdict, and two sizes.
+    """Return name, joints, verdict, and the largest distance and angle between the models as written.
 
-    For USD that a tool writes for a URDF, `same` gives two distances: the largest distance between the
-    models, and the largest distance that single precision can cause. Otherwise the sizes are the largest
-    distance and the largest angle between the models as they are written.
+    For USD of a URDF, the second size is the largest distance that single precision can cause.
     """
     try:
         joints, found = _compared(tool, pythons, name)
@@ -208,10 +197,7 @@ def wide_row(tools: Mapping[str, str], name: str) -> list[str]:
 
 
 def _loaded(file: Path) -> urdfkin.Robot:
-    """Return the robot of a file.
-
-    If the root link has no mass, the converter writes several articulations into the stage.
-    """
+    """Return the robot of a file; a root link without mass gives a stage with several articulations."""
     try:
         return urdfkin.load(file)
     except urdfkin.UrdfkinError as error:
@@ -221,7 +207,6 @@ def _loaded(file: Path) -> urdfkin.Robot:
 
 
 def main() -> None:
-    """Print the table in Markdown."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("tools", nargs="+", metavar="TOOL[=PYTHON]", help=f"one of {', '.join(TOOLS)}")
     parser.add_argument("--robots", nargs="+", default=list(catalogue()), help="default: the whole catalogue")

@@ -38,7 +38,6 @@ def said_of(path: Path) -> str:
 
 
 def main() -> None:
-    """Run the survey from the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
     folder: Path = parser.parse_args().folder

@@ -39,7 +39,6 @@ class Contender:
 
     library: str  # name of the distribution
     module: str  # name of the module
-    #: Returns the library's calls for one configuration.
     calls: Callable[[Subject, str], Iterator[Calls]] | None = None
     #: Returns the library's computations of a batch; None: the calls run in a loop.
     batches: Callable[[Subject, str], Iterator[Work]] | None = None
@@ -63,7 +62,6 @@ class Contender:
             return "a checkout"
 
     def works(self, subject: Subject, quantity: str) -> list[Work]:
-        """Return the library's computations of a whole batch."""
         if self.missing:
             return []
         if self.batches is not None:
@@ -71,11 +69,7 @@ class Contender:
         return [one.batch(subject, quantity) for one in self.singles(subject, quantity)]
 
     def singles(self, subject: Subject, quantity: str) -> list[Calls]:
-        """Return the library's calls for one configuration."""
         return [] if self.missing or self.calls is None else list(self.calls(subject, quantity))
-
-
-# -- urdfkin ---------------------------------------------------------------------------------------------
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
@@ -102,7 +96,6 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of the robot's method, and of a prepared frame with and without `out=`."""
     robot, arguments = subject.robot, "q" if quantity == "jacobian" else "q, v, a"
     names = {"fast": robot.prepare(subject.frame), "own": robot.compiled(subject.frame)}
     lines = (
@@ -115,7 +108,6 @@ def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def checked_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield two verified calls: the robot's method, and the same method of a prepared frame."""
     arguments = "q" if quantity == "jacobian" else "q, v, a"
     lines = f"robot.{quantity}({arguments}, frame, verify=True)", f"fast.{quantity}({arguments})"
     names = {"fast": subject.robot.prepare(subject.frame, verify=True)}
@@ -133,14 +125,8 @@ def _urdfkin_lines(
         yield Calls(f"urdfkin, {who}({', '.join(shown)})", names, (line,))
 
 
-# -- Pinocchio -------------------------------------------------------------------------------------------
-
-
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return Pinocchio's cheapest calls for a quantity.
-
-    The calls are `computeFrameJacobian`, or a recursion and `getFrameClassicalAcceleration`.
-    """
+    """Return Pinocchio's cheapest calls: `computeFrameJacobian`, or a recursion and an acceleration."""
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,
@@ -174,12 +160,11 @@ def _pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
     yield _in_processes(subject, quantity)
 
 
-#: State of a worker process. For each quantity, it contains the loop and the arrays of this loop.
+#: The loop and the shared arrays of a worker process.
 _here: dict[str, Any] = {}
 
 
 def _in_processes(subject: Subject, quantity: str) -> Work:
-    """Return the timed task in which several running processes with shared memory compute a batch."""
     spawn: Any = multiprocessing.get_context("spawn")
     buffers, arrays = [], []
     for x in (*subject.inputs(quantity, subject.n), np.zeros((subject.n, *subject.width(quantity)))):
@@ -217,10 +202,7 @@ def _share(start: int, stop: int) -> None:
     _here["loop"](out, *inputs)
 
 
-# -- other libraries, called as their users call them ----------------------------------------------------
-
-# A library is imported only when it is needed. If a library has another order of rows or coordinates, inputs
-# and results are reordered outside the measured time.
+# Inputs and results in another order of rows or coordinates are reordered outside the measured time.
 
 #: Row order that converts [angular; linear] to [linear; angular].
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
@@ -233,24 +215,14 @@ def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
 
 
 def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Return `J` (n, 6, m) as an array (n, 6, nv).
-
-    The columns of `J` get the indices `columns`; all other columns are zero.
-    """
+    """Return `J` (n, 6, m) as an array (n, 6, nv) with the given columns; all other columns are zero."""
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full
 
 
-# -- called in a loop ------------------------------------------------------------------------------------
-
-
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of dynibo, a library in Rust.
-
-    In dynibo, rows are [angular; linear], joints are sorted breadth first, and matrices are stored column by
-    column.
-    """
+    """Yield the calls of dynibo: rows [angular; linear], joints breadth first, matrices column by column."""
     import dynibo  # noqa: PLC0415
 
     robot = dynibo.Robot.from_urdf(str(subject.file))
@@ -291,11 +263,7 @@ def _link(joint: ET.Element, tag: str) -> str:
 
 
 def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of MuJoCo.
-
-    MuJoCo's accelerations are classical, with rows [angular; linear]. An option prevents MuJoCo from merging
-    links that are fixed to each other.
-    """
+    """Yield the calls of MuJoCo, with rows [angular; linear] and without merged links (`fusestatic`)."""
     import mujoco  # noqa: PLC0415
 
     flags = {"fusestatic": "false", "discardvisual": "true"}
@@ -330,10 +298,7 @@ def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of Drake.
-
-    Drake's rows are [angular; linear]. An acceleration is J a plus the terms that depend only on velocities.
-    """
+    """Yield the calls of Drake: rows [angular; linear]; an acceleration is J a plus a velocity term."""
     from pydrake.multibody.parsing import Parser  # noqa: PLC0415
     from pydrake.multibody.plant import MultibodyPlant  # noqa: PLC0415
     from pydrake.multibody.tree import JacobianWrtVariable  # noqa: PLC0415
@@ -370,10 +335,7 @@ def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of the Robotics Toolbox.
-
-    The calls compute a Jacobian with `jacob0`, and an acceleration as J a + Jdot v.
-    """
+    """Yield the calls of the Robotics Toolbox: `jacob0`, and an acceleration as J a + Jdot v."""
     import roboticstoolbox as rtb  # noqa: PLC0415
 
     with warnings.catch_warnings():
@@ -401,19 +363,14 @@ def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
     yield Calls(who, names, lines, order=order, remark=remark)
 
 
-# -- batches at once -------------------------------------------------------------------------------------
-
-#: Number of configurations in one call of PyTorch Kinematics. Larger calls take more time per configuration.
+#: Larger calls of PyTorch Kinematics take more time per configuration.
 _MOST = 20_000
 #: Tolerance for PyTorch Kinematics, which reads the angles of a URDF in single precision.
 _SINGLE = 1e-6
 
 
 def torch(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the computation by PyTorch Kinematics, once without and once with `torch.compile`.
-
-    The library computes no accelerations.
-    """
+    """Yield Jacobians of PyTorch Kinematics, with and without `torch.compile`; it has no accelerations."""
     import pytorch_kinematics as pk  # noqa: PLC0415
     import torch  # noqa: PLC0415
 
@@ -437,13 +394,7 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def jax(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the computation by JAX in float64.
-
-    `vmap` and XLA turn code for one configuration into a compiled batch.
-
-    This is typical fast code for one robot in JAX: the textbook's equations on JAX arrays, with the robot's
-    constants folded in. Inputs and results are JAX arrays.
-    """
+    """Yield the textbook's equations on JAX arrays in float64, compiled for a batch by `vmap` and XLA."""
     import jax  # noqa: PLC0415
     import jax.numpy as jnp  # noqa: PLC0415
 
@@ -477,9 +428,6 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
     )
 
 
-# -- all contenders --------------------------------------------------------------------------------------
-
-#: Contenders that must be installed.
 ALWAYS = (
     Contender("urdfkin", "urdfkin", urdfkin_calls, urdfkin_batches),
     Contender("pin", "pinocchio", _pinocchio, _pinocchio_batches),

@@ -35,7 +35,6 @@ _REMARK = "C written by CasADi for one robot, one frame, one quantity; it does n
 _FRAME = Path(__file__).with_suffix(".c")
 _FLAGS = ("-std=gnu11", "-O3", "-march=native", "-shared", "-fPIC")
 
-# -- the equations along one path ------------------------------------------------------------------------
 
 _Z = (0.0, 0.0, 1.0)
 
@@ -43,19 +42,9 @@ _Z = (0.0, 0.0, 1.0)
 def results(
     plan: CompiledTree, quantity: str, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> list[Any]:
-    """Compute a quantity of one frame in LOCAL_WORLD_ALIGNED; return its numbers, row by row.
+    """Return one frame's Jacobian (7.85) or acceleration (7.127 to 7.130), row by row, in world axes.
 
-    Jacobians (7.85) are computed in the world's axes, accelerations (7.127 to 7.130) in each link's axes.
-
-    Args:
-        plan: The compiled tree of one frame, whose joints have one coordinate each.
-        quantity: "jacobian" or "acceleration".
-        x: The coordinate of each joint, which may be any kind of number, such as a float or a symbol.
-        sines: The sine of each coordinate.
-        cosines: The cosine of each coordinate.
-        v: The velocity of each joint.
-        a: The acceleration of each joint.
-        eq: The textbook's equations, implemented for the same kind of number.
+    The joints have one coordinate each. The numbers and the equations `eq` may be of any kind.
     """
     recursion, state, columns = Recursion(eq, own=quantity == "acceleration"), State(), []
     for i, (kind, _, place) in enumerate(plan.steps.tolist()):
@@ -78,15 +67,10 @@ def results(
 
 
 def _pose(row: FloatArray) -> tuple[Any, Any]:
-    """Return the constant rotation R and translation p in a row of a compiled tree."""
     return row[:9].reshape(3, 3).tolist(), row[9:12].tolist()
 
 
-# -- as C ------------------------------------------------------------------------------------------------
-
-
 def batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the timed task in which generated C code computes a whole batch in one call."""
     compute = compiled(subject, quantity)
     inputs = subject.inputs(quantity, subject.n)
     out = np.empty((subject.n, *subject.width(quantity)))
@@ -99,11 +83,7 @@ def batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
-    """Return a function of the number of configurations and the addresses of q, v, a and the results.
-
-    Raises:
-        subprocess.CalledProcessError: the compiler rejects the code.
-    """
+    """Return a function of the number of configurations and the addresses of q, v, a and the results."""
     plan, folder = subject.plan, subject.folder
     turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
     tables = {
@@ -133,10 +113,7 @@ def _listed(numbers: Sequence[float]) -> str:
 
 
 def _straight_line(plan: CompiledTree, quantity: str) -> str:
-    """Return CasADi's C code of a function for one configuration.
-
-    The arguments of the function are (x, sines, cosines, v, a).
-    """
+    """Return CasADi's C code of a function of (x, sines, cosines, v, a) for one configuration."""
     import casadi  # noqa: PLC0415  installed or not
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]
@@ -147,8 +124,7 @@ def _straight_line(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # CasADi's code computes with single doubles, and tests whether an argument is missing.
-    # The next lines replace the doubles by vectors, and remove the tests.
+    # The code gets vectors instead of doubles, and loses its tests for missing arguments.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

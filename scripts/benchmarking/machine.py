@@ -24,11 +24,9 @@ from urdfkin.compiled.preload import only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the two measured times of a first use.
-#: The first is the time with an empty kernel cache, the second is the time with compiled kernels on disk.
+#: Keys of the times of a first use: with an empty kernel cache, and with compiled kernels on disk.
 EMPTY, KEPT = "empty_ms", "kept_ms"
-#: For each quantity whose first use compiles a kernel: its number of inputs.
-#: One input means q; two mean q and v; three mean q, v and a.
+#: For each quantity whose first use compiles a kernel: how many of the inputs q, v and a it has.
 USES = {
     "placement": 1,
     "velocity": 2,
@@ -42,7 +40,6 @@ USES = {
 
 
 def machine() -> dict[str, object]:
-    """Return the processor, the number of processors, the widest vector unit, memory, system and Python."""
     lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     entries = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
     flags = entries.get("flags", "").split()
@@ -63,10 +60,7 @@ def peak_over_output(robot: str, frame: str, quantity: str, n: int, *, out: bool
 
 
 def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield the processor time of each quantity's first use, and of all first uses in one process.
-
-    Each time is measured twice: with an empty kernel cache, and in another process with the kernels on disk.
-    """
+    """Yield the processor time of each first use and of all together, without and with stored kernels."""
     together = " + ".join(uses) if len(uses) > 1 else None
     for what in (*uses, *filter(None, [together])):
         with tempfile.TemporaryDirectory() as folder:
@@ -76,15 +70,11 @@ def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str
 
 
 def _run_apart(*words: str, cache: str | None = None) -> dict[str, Any]:
-    """Run this module in a new process and return its answer."""
     command = [sys.executable, "-m", "scripts.benchmarking.machine", *words]
     environment = os.environ | ({} if cache is None else {"NUMBA_CACHE_DIR": cache})
     done = subprocess.run(command, cwd=ROOT, capture_output=True, check=True, env=environment)
     result: dict[str, Any] = json.loads(done.stdout)
     return result
-
-
-# -- in that process -------------------------------------------------------------------------------------
 
 
 def _first(robot: str, frame: str, *uses: str) -> dict[str, object]:

@@ -17,10 +17,8 @@ from urdfkin.compiled import axes, outputs, recursion
 from urdfkin.compiled.plan import KEPT_ROWS, WIDTH, CompiledTree, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
-#: Number of operations that compute the sine and the cosine of an angle (`compiled.python_numbers`).
-#: The reduction of the angle needs 10 operations.
-#: The terms z and 1 - z/2, and their rounding errors, need 8 operations.
-#: The two polynomials need 20 operations, and the last steps need 13.
+#: Operations of a sine and a cosine (`compiled.python_numbers`): 10 reduce the angle.
+#: z, 1 - z/2 and their rounding errors need 8, the two polynomials 20, and the last steps 13.
 _SINE_COSINE = 51
 
 
@@ -29,8 +27,7 @@ class Number:
     """A number that stores its operands."""
 
     known: int | None = None  # 0 or 1 if the number is this constant; None otherwise
-    #: Whether the number is not needed. Operations with such a number are not counted, because their results
-    #: are not needed either.
+    #: Whether the number is not needed. Operations with such a number are not counted.
     nothing: bool = False
     made_of: tuple[Number, ...] = ()  # the operands; empty for an input
 
@@ -63,10 +60,7 @@ class Number:
 
 
 def count(results: Any) -> int:
-    """Return the number of operations that compute these results.
-
-    An operation that several results share counts once.
-    """
+    """Count the operations that compute these results; shared ones count once."""
     waiting, seen = [results], set[Number]()
     while waiting:
         value = waiting.pop()
@@ -126,7 +120,6 @@ def operations(plan: CompiledTree, quantity: str) -> int:
 
 
 def _cost(run: _Walk, instruction: list[int], quantity: str, state: tuple[Any, ...]) -> int:
-    """Return the operations of one instruction for the parts of the state that the quantity needs."""
     op, row, _, how, c = instruction
     run.written.clear()
     world = run.call.world_axes

@@ -13,8 +13,7 @@ from typing import Any
 
 from urdfkin.view.figure import BLUE, GREEN, VERMILION, new_figure, save, style
 
-#: For each prefix of a contender's name: the contender's colour, hatch and name in the legend.
-#: The last entry applies to all other contenders.
+#: For each prefix of a contender's name: colour, hatch and name in the legend.
 KINDS = {
     "urdfkin": (BLUE, "", "urdfkin"),
     "Pinocchio": (VERMILION, "////", "Pinocchio"),
@@ -30,11 +29,7 @@ Entry = Mapping[str, Any]
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> bytes:
-    """Write a picture in the format of the suffix of `path`; sections without measurements are empty.
-
-    Raises:
-        InputError: no matplotlib, or a suffix other than svg, png, pdf.
-    """
+    """Return a picture in the format of the suffix of `path`; sections without measurements are empty."""
     rows = figures["rows"]
     with style(font_size=11, svg_fonttype="none", hatch_linewidth=0.8):
         figure = new_figure(11.0, 12.0)  # wide enough for the longest contender's name
@@ -57,19 +52,13 @@ def _light(svg: bytes) -> bytes:
 
 
 def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
-    """Return the rows of a section for one quantity.
-
-    If the rows are for several robots, only the rows of the first robot are returned.
-    """
+    """Return the rows of a section for one quantity; if they are for several robots, those of the first."""
     found = [row for row in rows if row["section"] == section and row["quantity"] == quantity]
     return [row for row in found if section == "joints" or row["robot"] == found[0]["robot"]]
 
 
 def _bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
-    """Draw a bar for each contender, the fastest on top.
-
-    The scale is logarithmic, because the slowest contender takes two hundred times as long as the fastest.
-    """
+    """Draw a bar for each contender, the fastest on top, on a logarithmic scale."""
     ordered = sorted(rows, key=lambda row: -float(row["median_ns"]))
     costs = [row["median_ns"] for row in ordered]
     names = [row["who"] for row in ordered]

@@ -35,9 +35,6 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-#: Names of three measurements of Pinocchio in a Python loop.
-#: The first two measure Pinocchio's cheapest calls, with and without storing the results.
-#: The third one measures the calls that compute all joints.
 STORED = "Pinocchio's cheapest calls, results stored"
 NOT_STORED = "Pinocchio's cheapest calls, nothing stored"
 ALL_JOINTS = "Pinocchio's calls for all joints, results stored"
@@ -103,7 +100,6 @@ def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:
 
 
 def _contests(section: str, n: int) -> Iterator[tuple[Subject, str, Table]]:
-    """Yield each combination of a subject and a quantity, with its table."""
     for source in SUBJECTS:
         with Subject(*source, n) as subject:
             for quantity in QUANTITIES:
@@ -114,15 +110,8 @@ def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Tabl
     return Table(section, subject.name, quantity, subject.numbers(quantity), size)
 
 
-# -- how cost grows --------------------------------------------------------------------------------------
-
-
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
-    """Measure how the time of the tip's Jacobian and acceleration grows with the joints of a chain.
-
-    One thread is used. The Jacobians of each batch contain `numbers` numbers, so that all batches have the
-    same memory traffic.
-    """
+    """Measure the tip's time against the joints of a chain; each batch of Jacobians has `numbers` numbers."""
     for size in joints:
         n = max(numbers // (6 * size), 16)
         with Subject(chain_urdf(size), TIP, n, name=f"chain of {size}") as subject:
@@ -172,15 +161,10 @@ def _frame_works(subject: Subject, frames: Sequence[str]) -> list[Work]:
     return [Work(ONE_PASS, n, together, together), Work(ONE_BY_ONE, n, apart, lambda: out.swapaxes(0, 1))]
 
 
-# -- where the time goes ---------------------------------------------------------------------------------
+# A batch runs with and without the instructions of a part; the difference is the time of the part.
+# A single call runs as calls that stop early, such as an empty function and a call with rejected arguments.
 
-# The forward recursion is a program of a few instructions (`urdfkin.compiled.plan`). To measure a part, the
-# program runs with the instructions of this part and without them. The difference of the two times is the
-# time of the part. The parts of a single call are measured with calls that stop early, such as a call of an
-# empty Python function and a call with rejected arguments.
-
-#: For each part of a batch computation: the instructions of this part.
-#: The script adds the parts in this order.
+#: The instructions of each part of a batch computation, in the order in which the parts are added.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
@@ -232,9 +216,6 @@ def _core(subject: Subject, quantity: str, program: KernelProgram, who: str) -> 
 
     compute()
     return Work(who, subject.n, compute)
-
-
-# -- single calls ----------------------------------------------------------------------------------------
 
 
 def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
@@ -302,11 +283,7 @@ def _times(works: list[Work], rounds: int) -> dict[str, FloatArray]:
 def _entry(
     kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
-    """Return the medians over all rounds.
-
-    Two times are subtracted only within a round, so that other load of the machine affects both times
-    equally.
-    """
+    """Return medians over all rounds; times are subtracted only within a round, with the same other load."""
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
     return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}

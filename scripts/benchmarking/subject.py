@@ -15,32 +15,19 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
-#: The quantities of the tables.
 QUANTITIES = ("jacobian", "acceleration")
-#: The robots of the benchmark, each with its frame.
-#: The third robot is a humanoid; the path to its frame is only a small part of its tree.
+#: The third robot is a humanoid, and the path to its frame is a small part of its tree.
 SUBJECTS = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: Number of configurations in a loop of calls; the time for a single call does not depend on this number.
 LOOP = 2_000
-#: Name of the frame at the tip of a generated chain of joints.
 TIP = "tip"
 
 
 class Subject:
-    """The common input of all contenders.
+    """The common input of all contenders: one robot and frame, q (n, nq), v and a (n, nv).
 
-    Mimic joints are independent, so that every library has the same coordinates, each with a single number.
-
-    Attributes:
-        name: Name of the robot in the tables.
-        frame: Name of the frame.
-        n: Number of configurations of a batch.
-        loop: Number of configurations in a loop.
-        robot: The robot in urdfkin; nv is the number of columns of its Jacobians.
-        q: (n, nq) configurations.
-        v: (n, nv) joint velocities.
-        a: (n, nv) joint accelerations.
-        stack: Exit stack that closes open resources of the contenders.
+    Mimic joints are independent, so that every library has the same coordinates, each with one number.
+    `loop` is the number of configurations in a loop of calls. `stack` closes resources of the contenders.
     """
 
     def __init__(self, source: str, frame: str, n: int, *, name: str | None = None) -> None:
@@ -61,7 +48,6 @@ class Subject:
 
     @property
     def plan(self) -> CompiledTree:
-        """The compiled tree of the frame."""
         return self.robot.plan([self.robot.tree.frame_link(self.frame)])
 
     @cached_property
@@ -71,7 +57,6 @@ class Subject:
 
     @cached_property
     def folder(self) -> Path:
-        """Temporary folder for the files of a contender."""
         return Path(self.stack.enter_context(tempfile.TemporaryDirectory()))
 
     @cached_property
@@ -86,7 +71,6 @@ class Subject:
         return (6, self.nv) if quantity == "jacobian" else (6,)
 
     def numbers(self, quantity: str) -> int:
-        """Return the number of values of one configuration's result."""
         return int(np.prod(self.width(quantity)))
 
     def inputs(self, quantity: str, n: int) -> tuple[FloatArray, ...]:
@@ -94,23 +78,15 @@ class Subject:
         return tuple(x[:n] for x in ((self.q,) if quantity == "jacobian" else (self.q, self.v, self.a)))
 
 
-# -- the URDF that every library reads -------------------------------------------------------------------
-
 _INERTIA = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
-#: Child elements of `<joint>` that `bare_urdf` keeps.
 _KEPT = ("origin", "parent", "child", "axis", "limit")
 
 
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
-    """Return a URDF with only the links and joints of `urdf`.
+    """Return a URDF with only the links and joints, without mimic rules, and with equal inertias.
 
-    All links get the same unit inertia, since some libraries need one; kinematics does not depend on it.
-    Mimic rules are removed, so that all contenders have the same independent coordinates. A link named world
-    gets another name, since some libraries have their own body of that name.
-
-    Args:
-        urdf: The text of a URDF.
-        flags: Attributes of MuJoCo's element `mujoco/compiler`; None to leave it out.
+    Some libraries need an inertia, and some have a body `world`, so a link with this name is renamed.
+    `flags` are the attributes of MuJoCo's element `mujoco/compiler`.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))
@@ -130,11 +106,7 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
 
 
 def chain_urdf(joints: int, seed: int = 0) -> str:
-    """Return a serial robot of revolute joints with different axes and links of 0.1 m.
-
-    The alphabetical order of the joint names is their order in the chain. The frame `TIP` is fixed to the
-    last link.
-    """
+    """Return a chain of revolute joints, named in their order, with oblique axes and links of 0.1 m."""
     generator = np.random.default_rng(seed)
     axes = generator.standard_normal((joints, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)

@@ -21,17 +21,12 @@ from scripts.pages import table as markdown
 Entry = Mapping[str, Any]
 _SHARE = "times generated code"
 NOT_MEASURED = "Not measured yet."
-#: Pattern of urdfkin's name in the measurements with all threads. The name contains the number of threads
-#: that the benchmark used.
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 
 
 @dataclass(frozen=True)
 class Words:
-    """One table as text: section, title, rows as mappings from heading to cell, and remarks.
-
-    The first column contains names.
-    """
+    """A table as text: its rows map headings to cells, and its first column has names."""
 
     section: str
     title: str
@@ -40,12 +35,10 @@ class Words:
 
     @property
     def head(self) -> tuple[str, ...]:
-        """The headings of the columns."""
         return tuple(self.cells[0])
 
     @property
     def rows(self) -> list[tuple[str, ...]]:
-        """The cells of each row."""
         return [tuple(row.values()) for row in self.cells]
 
 
@@ -56,7 +49,6 @@ def number(x: float) -> str:
 
 
 def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
-    """Yield the tables of a run, in order."""
     sections: dict[str, list[Entry]] = {}
     for row in figures["rows"]:
         sections.setdefault(row["section"], []).append(row)
@@ -79,7 +71,6 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
 
 
 def show(figures: Mapping[str, Any], console: Console | None = None) -> None:
-    """Print all tables, the machine and the libraries."""
     console = console or Console(width=110, highlight=False)
     console.print(_machine(figures))
     for words in tables(figures):
@@ -95,11 +86,7 @@ def show(figures: Mapping[str, Any], console: Console | None = None) -> None:
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
-    """Return the page `text` with the figures inserted; a missing measurement is reported in its place.
-
-    Raises:
-        ValueError: the page does not have exactly one place for a measurement.
-    """
+    """Return the page with the figures in their places; raise ValueError if a place is missing or double."""
     parts: dict[str, list[str]] = {"machine": [_machine(figures)]}
     for words in tables(figures):
         remarks = "".join(f"\n[{i}] {remark}." for i, remark in enumerate(words.remarks, start=1))
@@ -127,9 +114,6 @@ def _groups(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
     """Yield "robot, quantity" and the rows of each robot and quantity."""
     for (robot, quantity), group in groupby(rows, key=lambda row: (row["robot"], row["quantity"])):
         yield f"{robot}, {quantity}", list(group)
-
-
-# -- contests ------------------------------------------------------------------------------------------
 
 
 def _contest(section: str, title: str, rows: list[Entry]) -> Words:
@@ -200,9 +184,6 @@ def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
     )
 
 
-# -- where the time goes ---------------------------------------------------------------------------------
-
-
 def _where(title: str, entries: Sequence[Entry]) -> Words:
     """Return a column for each robot and quantity, with nanoseconds and the fraction of the total time."""
     names = [f"{entry['robot']}, {entry['quantity']}" for entry in entries]
@@ -224,9 +205,6 @@ def _first(entries: Sequence[Entry]) -> Words:
         for entry in entries
     ]
     return Words("first", f"{entries[0]['robot']}: processor time of a first use, s", cells)
-
-
-# -- growth ----------------------------------------------------------------------------------------------
 
 
 def _joints(rows: list[Entry]) -> Words:

@@ -21,20 +21,16 @@ import numpy as np
 from scripts.benchmarking.subject import Subject
 from urdfkin.model.tree import FloatArray
 
-#: Allowed difference of results in m, rad, m/s^2, rad/s^2.
-#: The limit detects different computations, not errors of accuracy.
+#: Allowed difference (m, rad, m/s^2, rad/s^2), which detects other computations, not inaccuracy.
 TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class Work:
-    """The computation of one quantity by one contender."""
-
     who: str  # name of the contender in the tables
     n: int  # number of configurations: `compute` uses the first `n` configurations of the subject
     compute: Callable[[], object]  # the timed function
-    #: Returns the results in urdfkin's conventions, for the first configurations. It is not timed. None:
-    #: there are no results to compare; for example, a task only writes the output.
+    #: Returns the results in urdfkin's conventions, untimed. None: there is nothing to compare.
     result: Callable[[], FloatArray] | None = None
     tolerance: float = TOLERANCE  # allowed difference from Pinocchio
     remark: str = ""  # a remark on the measurement
@@ -42,8 +38,6 @@ class Work:
 
 @dataclass(frozen=True)
 class Table:
-    """The common properties of the rows of a table."""
-
     section: str  # a name of `sections.SECTIONS`
     robot: str  # a name of the catalogue, or the number of joints of a chain
     quantity: str  # jacobian, acceleration or placement
@@ -53,8 +47,6 @@ class Table:
 
 @dataclass(frozen=True)
 class Row(Table):
-    """One contender's measurements."""
-
     who: str = ""  # name of the contender
     n: int = 0  # number of configurations of a call
     median_ns: float = 0.0  # median time for one configuration over the rounds
@@ -69,11 +61,7 @@ class DifferenceError(Exception):
 
 
 def agree(works: Sequence[Work], reference: Work, what: str) -> None:
-    """Compute all results once, also as a warm-up, and compare them with the result of `reference`.
-
-    Raises:
-        DifferenceError: a result differs; the message has the contender and the largest difference.
-    """
+    """Compute all results once, also as a warm-up; raise DifferenceError if one differs from `reference`."""
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
@@ -95,10 +83,7 @@ def agree(works: Sequence[Work], reference: Work, what: str) -> None:
 def times(
     works: Sequence[Work], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, list[float]]:
-    """Return the nanoseconds for one configuration.
-
-    Each of `works` runs once in each round, in varying order.
-    """
+    """Return the nanoseconds for one configuration; each work runs once in each round, in varying order."""
     found: dict[str, list[float]] = {work.who: [] for work in works}
     shuffled, order = list(works), random.Random(0)
     collecting = gc.isenabled()
@@ -124,15 +109,7 @@ def measure(
     baseline: Work | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> list[Row]:
-    """Time `works`.
-
-    Args:
-        table: The common properties of the rows.
-        works: Computations that have run once before, so that no kernel is compiled during the measurement.
-        rounds: Number of rounds, at least one.
-        baseline: The element of `works` with which all others are compared.
-        clock: Returns seconds.
-    """
+    """Time works that have run once before, so that no kernel is compiled while the clock runs."""
     found = times(works, rounds, clock)
     medians = {who: statistics.median(values) for who, values in found.items()}
 
@@ -145,25 +122,19 @@ def measure(
     return [row(work) for work in works]
 
 
-# -- calls in a loop -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Calls:
-    """The lines of Python that call a library to compute one quantity of one configuration.
+    """The lines of Python that call a library for one configuration.
 
-    The lines become the body of a loop over configurations, and their names become local variables.
-    Therefore, the measured time of a library includes no function call of the benchmark.
+    They become the body of a loop, so the measured time includes no call of the benchmark itself.
     """
 
     who: str  # name of the contender
     names: Mapping[str, Any]  # variables that the lines use, besides `q`, `v` and `a`
     lines: tuple[str, ...]  # the calls; the last line is an expression whose value is the result
-    #: The lines for a batch, which write their result to `out[k]`. None: the batch runs `lines`, and stores
-    #: the value of the last line in `out[k]`.
+    #: The lines for a batch, which write into `out[k]`. None: a batch stores the value of the last line.
     store: tuple[str, ...] | None = None
-    #: For each coordinate of the library, its index among urdfkin's coordinates. None: the library and
-    #: urdfkin have the same order.
+    #: For each coordinate of the library, its index in urdfkin. None: the order is the same.
     order: list[int] | None = None
     #: Shape of one configuration's result in a batch; None: urdfkin's shape.
     shape: tuple[int, ...] | None = None
@@ -182,18 +153,12 @@ class Calls:
         return Work(self.who, subject.loop, run, result, remark=self.remark)
 
     def loop(self) -> Callable[..., None]:
-        """Return a function with the loop.
-
-        The arguments of the function are `out` and the batch of q, or the batches of q, v and a.
-        """
+        """Return a loop as a function of `out` and the batch of q, or the batches of q, v and a."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
 
     def single(self, subject: Subject, quantity: str) -> Work:
-        """Return the timed task for single calls.
-
-        The results of these calls are not stored, and the rows of the inputs are prepared beforehand.
-        """
+        """Return the timed task for single calls, whose results are not stored."""
         inputs = [list(self._ordered(x)) for x in subject.inputs(quantity, subject.loop)]
         rows = list(_rows(inputs))
         repeat = _function(self.names, "rows_", "for q, v, a in rows_:", self.lines)
@@ -217,10 +182,7 @@ def _rows(inputs: Any) -> Any:
 def _function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Make a function whose code is the line `head` and, below it, the indented lines `body`.
-
-    The code can use `names` as local variables.
-    """
+    """Make a function of the line `head` and the lines `body` below it; `names` are its local variables."""
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

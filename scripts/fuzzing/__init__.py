@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-#: Outcomes with which the test of a robot passes.
 GOOD = (
     "refused",
     "verified",
@@ -13,8 +12,6 @@ GOOD = (
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A document, the options to load it, and a description of its origin."""
-
     what: str
     data: bytes
     root_joint: str | None = None
@@ -22,7 +19,6 @@ class Case:
 
     @property
     def words(self) -> str:
-        """Return the line of text that is stored as a note with a failing file."""
         options = f"root_joint={self.root_joint!r}, mimic={self.mimic!r}"
         return f"{self.what}; load(..., {options})"
 

@@ -29,12 +29,10 @@ from urdfkin.urdf.lint import Finding, Severity, UrdfError
 from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.verify.verifier import NotVerifiedWarning
 
-#: Findings about sizes beyond the floating-point range.
-#: Results of robots with such findings may be infinite or nan.
+#: Robots with these findings have sizes beyond the floating-point range, so results may be nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
-#: Largest numbers of frames for which quantities are computed in one pass, and one by one.
+#: Largest numbers of frames in one pass, and of frames one by one.
 TOGETHER, ALONE = 12, 2
-#: Number of frame names that are looked up for each robot.
 NAMES = 6
 #: Distance of the far base from the world's origin, in metres.
 FAR = 1e6
@@ -47,7 +45,6 @@ class MismatchError(Exception):
 
 
 def judge(case: Case) -> Outcome:
-    """Return the outcome of a document."""
     try:
         return _judge_mjcf(case) if is_mjcf(case.data) else _judge(case)
     except UrdfkinError as error:
@@ -87,7 +84,6 @@ def _judge_mjcf(case: Case) -> Outcome:
 
 
 def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
-    """Compute all quantities and return the outcome."""
     too_large = "a result is not a finite number"
     if _SIZES & {finding.code for finding in findings}:
         too_large = "too large to compute, with a finding that states the reason"
@@ -121,16 +117,10 @@ def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.War
     return Outcome("not verified, and no finding states the reason", texts)
 
 
-# -- all quantities ----------------------------------------------------------------------------------------
-
-
 def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the name and the result of each checked computation.
+    """Yield the name and the result of each checked computation; raise MismatchError if two differ.
 
-    Raises:
-        MismatchError: two computations differ.
-        UrdfkinError: a call raises an error. Errors about singular representations and about paths without a
-            table are expected and not raised.
+    Errors about singular representations and about paths without a table are expected.
     """
     generator = np.random.default_rng(seed)
     inputs = _inputs(robot, seed)
@@ -153,11 +143,7 @@ def ask(robot: Robot, seed: int) -> Iterator[tuple[str, FloatArray]]:
 
 
 def ask_prepared(robot: Robot, seed: int) -> None:
-    """Compare the unchecked results of a prepared frame with the results of checked calls.
-
-    Raises:
-        MismatchError: a result of the prepared frame differs.
-    """
+    """Compare unchecked results of a prepared frame with checked ones; raise MismatchError if one differs."""
     inputs = [x[0] for x in _inputs(robot, seed)]
     frame = robot.all_frames[-1]
     for reference in Reference:
@@ -203,11 +189,7 @@ def _together(
     base: BaseMotion | None,
     inputs: tuple[FloatArray, ...],
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield each quantity, computed in three ways.
-
-    The three ways are all frames in a batch of configurations, one frame in the same batch, and a single
-    configuration of the batch.
-    """
+    """Yield each quantity for all frames in a batch, compared with one frame and with one configuration."""
     q, v, a = inputs
     single = [x[1] for x in inputs]
     for name in QUANTITIES:
@@ -229,10 +211,7 @@ def _together(
 
 
 def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames that are given by name.
-
-    urdfkin and Pinocchio look up each name independently.
-    """
+    """Yield placements of frames by name; urdfkin and Pinocchio look up each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     own = sorted(links | joints)
     asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]

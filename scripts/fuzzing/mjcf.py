@@ -18,8 +18,7 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference between placements by urdfkin and by MuJoCo.
-#: The two sides of an equality may differ by the same amount.
+#: Allowed relative difference from MuJoCo's placements, and of the two sides of an equality.
 _APART = 1e-12
 
 # Otherwise MuJoCo writes a log of dynamics warnings into the current folder.
@@ -27,14 +26,11 @@ mujoco.set_mju_user_warning(lambda said: None)
 
 
 def robot(seed: int, family: str, number: int) -> Case:
-    """Return the random MJCF file with a given number in its family."""
     rng = random.Random(f"{seed}:{family}:{number}")
     return Case(f"{family} {number}", _File(rng, family).text().encode())
 
 
 class _File:
-    """Writer of one random MJCF file."""
-
     def __init__(self, rng: random.Random, family: str) -> None:
         self.rng, self.family = rng, family
         self.bodies, self.sites = 0, 0
@@ -42,7 +38,6 @@ class _File:
         self.degrees = rng.random() < 0.4
 
     def text(self) -> str:
-        """The document."""
         rng = self.rng
         trees = "".join(self.body(0) for _ in range(rng.randint(1, 3)))
         words = {
@@ -60,7 +55,6 @@ class _File:
         )
 
     def defaults(self) -> str:
-        """Return nested default classes for joints, shapes and sites."""
         if self.family != "mjcf-classes":
             return ""
 
@@ -74,7 +68,6 @@ class _File:
         return f'<default>{outer}<default class="other">{inside()}</default></default>'
 
     def body(self, depth: int) -> str:
-        """Return a body with its joints, shapes, sites and child bodies."""
         rng = self.rng
         name, self.bodies = f"body{self.bodies}", self.bodies + 1
         words = [f'name="{name}"', f'pos="{self.vector()}"', self.orientation()]
@@ -95,29 +88,24 @@ class _File:
         return f"<body {' '.join(words)}>{''.join(parts)}</body>"
 
     def site_words(self) -> str:
-        """Return the attributes of a site's pose, or an empty text."""
         return f'pos="{self.vector()}" {self.orientation()}' if self.rng.random() < 0.7 else ""
 
     def of_class(self) -> str:
-        """Return the attribute `class` with a random class, or an empty text."""
         named = self.family == "mjcf-classes" and self.rng.random() < 0.4
         return f' class="{self.rng.choice(_CLASSES)}"' if named else ""
 
     def free_joint(self) -> str:
-        """Return a free joint, in one of its two notations."""
         name, align = f"free{self.bodies}", self.rng.choice(("true", "false", "auto"))
         if self.rng.random() < 0.5:
             return f'<joint name="{name}" type="free"/>'
         return f'<freejoint name="{name}" align="{align}"/>'
 
     def joint(self) -> str:
-        """Return a hinge or slide joint."""
         name = f"joint{len(self.joints)}"
         self.joints.append(name)
         return f'<joint name="{name}"{self.of_class()} {" ".join(self.joint_words(0.7))}/>'
 
     def joint_words(self, share: float) -> list[str]:
-        """Return random attributes of a joint or its class."""
         rng = self.rng
         lower, upper = sorted((rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0)))
         large = rng.random() < 0.2
@@ -136,7 +124,6 @@ class _File:
         return f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>'
 
     def orientation(self) -> str:
-        """Return an orientation in a random notation of MJCF, or no orientation."""
         rng = self.rng
         angle = 90.0 if self.degrees else 1.5
         notations = (
@@ -149,7 +136,6 @@ class _File:
         return rng.choice(notations)
 
     def vector(self) -> str:
-        """Return three random lengths as text."""
         return " ".join(repr(odd.tame_length(self.rng)) for _ in range(3))
 
     def equalities(self) -> str:
@@ -180,10 +166,7 @@ def compiled(data: bytes) -> mujoco.MjModel | None:
 
 
 def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
-    """Return a message about a body, a site or a joint coupling that differs from MuJoCo's.
-
-    The result is None if nothing differs.
-    """
+    """Return a message about a body, a site or a joint coupling that differs from MuJoCo's, or None."""
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     warned = {one.name for one in robot.findings if one.code == "MJCF101" and one.element == "equality"}

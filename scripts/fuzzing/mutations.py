@@ -40,7 +40,6 @@ Mutator = Callable[[random.Random, bytes], bytes]
 
 
 def mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
-    """Return the description and the bytes of the mutant with the given number."""
     rng = random.Random(f"{seed}:{number}")
     path = rng.choice(list(files))
     data = path.read_bytes()
@@ -51,9 +50,6 @@ def mutant(seed: int, number: int, files: Sequence[Path]) -> Case:
         data = mutate(rng, data)
         done.append(mutate.__name__.strip("_"))
     return Case(" ".join(done), data)
-
-
-# -- bytes -------------------------------------------------------------------------------------------
 
 
 def _flip_a_bit(rng: random.Random, data: bytes) -> bytes:
@@ -89,8 +85,6 @@ def _other_encoding(rng: random.Random, data: bytes) -> bytes:
     text = data.decode("utf-8", "replace")
     return text.encode(rng.choice(("utf-16", "utf-16-le", "utf-32", "utf-8-sig")), "replace")
 
-
-# -- tokens ------------------------------------------------------------------------------------------
 
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
@@ -137,9 +131,6 @@ def _pick(rng: random.Random, data: bytes, pattern: re.Pattern[bytes]) -> re.Mat
 def _replace_one(rng: random.Random, data: bytes, pattern: re.Pattern[bytes], piece: bytes) -> bytes:
     match = _pick(rng, data, pattern)
     return data if match is None else data[: match.start()] + piece + data[match.end() :]
-
-
-# -- attributes and structure, on the parsed document ------------------------------------------------
 
 
 def _on_tree(change: Callable[[random.Random, ET.Element], None]) -> Mutator:

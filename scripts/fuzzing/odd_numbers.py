@@ -9,10 +9,7 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
 def written(rng: random.Random, x: float) -> str:
-    """Return a number as text in a random notation.
-
-    The text represents the number itself or a number very close to it.
-    """
+    """Return a number, or a number very close to it, as text in a random notation."""
     plain = repr(x)
     if rng.random() < 0.85:
         return plain
@@ -20,7 +17,6 @@ def written(rng: random.Random, x: float) -> str:
 
 
 def vector(rng: random.Random, numbers: list[float]) -> str:
-    """Return several numbers separated by a blank."""
     return " ".join(written(rng, x) for x in numbers)
 
 
@@ -82,25 +78,18 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 
 
 def odd_size(rng: random.Random) -> float:
-    """Return the length of a direction vector.
-
-    The length is mostly about 1, and sometimes close to the smallest or the largest double.
-    """
+    """Return the length of a direction: mostly about 1, sometimes near the smallest or largest double."""
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
     return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
 
 
 def odd_factor(rng: random.Random) -> float:
-    """Return the multiplier of a mimic joint."""
     plain = (0.0, -0.0, 1.0, -1.0, 3.7, -0.1, 1e-300, 5e-324)
     return rng.choice((*plain, rng.gauss(0.0, 1.0), -(10.0 ** rng.uniform(-12, 12))))
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
-    """Return random limits of a joint: equal, one unit in the last place apart, far apart, or infinite.
-
-    A few are reversed.
-    """
+    """Return random limits of a joint: equal, adjacent, far apart, infinite or, rarely, reversed."""
     a = odd_angle(rng) if turns else odd_length(rng)
     b = odd_angle(rng) if turns else odd_length(rng)
     if rng.random() < 0.02:

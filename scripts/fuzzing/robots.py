@@ -14,8 +14,7 @@ from scripts.fuzzing import Case
 from scripts.fuzzing import odd_numbers as odd
 from urdfkin.urdf.records import FURTHER_LIMITS
 
-#: Kinds of unusual content, one for each family.
-#: In addition, robots of the family "everything" have several random kinds.
+#: Robots of the family "everything" have several random kinds of unusual content.
 ODDITIES = ("names", "prefixes", "versions", "followers", "lengths", "angles", "axes", "limits", "roots")
 FAMILIES = (*ODDITIES, "everything")
 
@@ -24,7 +23,6 @@ LIKE_OURS = (
     "a", "link:a", "joint:a", "link:link:a", "link:joint:a", "universe", "root_joint", "base", "link:", "1",
     "joint 1", "moving base (urdfkin)",
 )  # fmt: skip
-#: Names that may break a program.
 STRANGE = (
     "-", "--", " ", " a", "a ", "\u00a0", "\u200b", "_", ".", "/", "../a", "a/b", "ä", "a\u0308", "关节",
     "\U0001f916", "\u202eba", "<a>", "&amp;", "'", '"', "#", "%s", "{0}", "$a", "=1+1", "null", "None", "nan",
@@ -53,7 +51,6 @@ PREFIXES = ("drake", "gazebo", "link", "joint", "x", "mujoco", "ns0", "xml", "_"
 
 
 def robot(seed: int, family: str, number: int) -> Case:
-    """Return the random robot with a given number in its family."""
     rng = random.Random(f"{seed}:{family}:{number}")
     if family == "everything":
         strange: Collection[str] = {name for name in ODDITIES if rng.random() < 0.4}
@@ -66,8 +63,6 @@ def robot(seed: int, family: str, number: int) -> Case:
 
 
 class _Robot:
-    """Writer of the URDF of one random robot."""
-
     def __init__(self, rng: random.Random, strange: Collection[str]) -> None:
         self.rng, self.strange = rng, strange
         self.version = rng.choice(("", "1.0", "1.1", "1.1", "1.2", "1.2")) if "versions" in strange else ""
@@ -85,7 +80,6 @@ class _Robot:
         )
 
     def text(self) -> str:
-        """The document."""
         rng, version = self.rng, self.version
         numbers = f' version="{version}"' if version else ""
         name = quoteattr(rng.choice((*LIKE_OURS, *STRANGE)) if "names" in self.strange else "r")
@@ -100,7 +94,6 @@ class _Robot:
         )
 
     def names(self, letter: str, count: int) -> list[str]:
-        """Return `count` different names."""
         if "names" not in self.strange:
             return [f"{letter}{i}" for i in range(count)]
         names = dict[str, None]()
@@ -126,7 +119,6 @@ class _Robot:
         return f'<joint name={quoteattr(self.joints[i])} type="{kind}">{"".join(parts)}</joint>'
 
     def origin(self) -> str:
-        """Return the origin of the joint."""
         rng = self.rng
         length = odd.odd_length if "lengths" in self.strange and rng.random() < 0.5 else odd.tame_length
         angle = odd.odd_angle if "angles" in self.strange and rng.random() < 0.5 else odd.tame_angle
@@ -148,7 +140,6 @@ class _Robot:
         return f'<axis xyz="{odd.vector(self.rng, numbers)}"/>' if self.rng.random() < 0.9 else ""
 
     def limit(self, kind: str) -> str:
-        """Return the limits of the joint, if its kind has any."""
         rng = self.rng
         # From version 1.2 on, limits apply to all kinds of joints.
         least = 0.8 if "versions" in self.strange else 1.0
@@ -171,12 +162,10 @@ class _Robot:
         return f"<limit {' '.join(words)}/>"
 
     def mimic(self, i: int) -> str:
-        """Return a mimic rule of joint i, which refers to an earlier or a later joint."""
         rng = self.rng
         if "followers" not in self.strange or self.kinds[i] not in _ONE_COORDINATE or rng.random() < 0.35:
             return ""
         # A mimic joint mimics only a joint with a lower number, so there is no cycle.
-        # The order in the tree differs, since joints are sorted by depth and name.
         leaders = [j for j in range(i) if self.kinds[j] in _ONE_COORDINATE]
         if not leaders:
             return ""
@@ -188,7 +177,6 @@ class _Robot:
         return f"<mimic {' '.join(words)}/>"
 
     def foreign(self) -> str:
-        """Return an element that belongs to another program, or an empty text."""
         if "prefixes" not in self.strange or self.rng.random() < 0.6:
             return ""
         return self.rng.choice(_FOREIGN).format(p=self.prefix)

@@ -36,12 +36,10 @@ class Slip:
 
     @property
     def line(self) -> int:
-        """Line of the mutated node in its file."""
         return getattr(self.shown, "lineno", 0)
 
     @property
     def what(self) -> str:
-        """The text before and after the change."""
         before = _short(self.shown)
         with self.made() as old:
             after = _short(self.shown if self.shown is not old else self.value)
@@ -57,7 +55,6 @@ class Slip:
             self._put(old)
 
     def make(self) -> None:
-        """Change the tree in place permanently."""
         self._put(self.value)
 
     def _put(self, value: Any) -> Any:
@@ -76,7 +73,6 @@ def slips(tree: ast.Module) -> list[Slip]:
 
 
 def mutated(source: str, number: int) -> ast.Module:
-    """Return the syntax tree of a file with one small mistake (a mutant) in it."""
     tree = ast.parse(source)
     slips(tree)[number].make()
     return ast.fix_missing_locations(tree)
@@ -89,17 +85,12 @@ def function_at(tree: ast.Module, line: int) -> str:
 
 @lru_cache(maxsize=1)
 def _definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]:
-    """Return all functions and classes in their order."""
     kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
     return sorted((node for node in ast.walk(tree) if isinstance(node, kinds)), key=lambda node: node.lineno)
 
 
 def rewritten(source: str, before: str, after: str) -> ast.Module:
-    """Return a file's tree with one piece of its text replaced.
-
-    Raises:
-        ValueError: the text does not occur exactly once.
-    """
+    """Return a file's tree with one text replaced; raise ValueError if it does not occur exactly once."""
     if source.count(before) != 1:
         raise ValueError(f"found {source.count(before)} times: {before}")
     return ast.parse(source.replace(before, after))
