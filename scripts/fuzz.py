@@ -22,17 +22,16 @@ from __future__ import annotations
 
 import argparse
 import collections
-import contextlib
-import json
-import select
-import subprocess
+import multiprocessing
+import os
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, partial
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
@@ -41,6 +40,7 @@ from scripts.fuzzing.mutations import LARGEST, mutant
 from urdfkin.urdf.catalogue import catalogue
 
 READY, FIRST_WAIT = "ready", 300.0
+_SPAWN = multiprocessing.get_context("spawn")
 
 MUTANTS = "mutants"
 FAMILIES = (MUTANTS, *robots.FAMILIES, *mjcf.FAMILIES)
@@ -59,66 +59,58 @@ def case(seed: int, family: str, number: int) -> Case:
 
 
 class Worker:
-    """A process that tests one document after another, and may crash."""
+    """A process that tests one document after another, and may crash; `work` is its main function."""
 
-    def __init__(self, command: list[str], timeout: float) -> None:
-        self.command, self.timeout = command, timeout
-        self.process: subprocess.Popen[str] | None = None
+    def __init__(self, work: Callable[[Connection], None], timeout: float) -> None:
+        self.work, self.timeout = work, timeout
+        self.process: BaseProcess | None = None
 
     def judge(self, family: str, number: int) -> tuple[str, str]:
         """Test a document; return the outcome and its details; a crash and a hang are possible outcomes."""
-        process = self.process or self.start()
-        assert process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # the process has ended, which the next line detects
-            print(family, number, file=process.stdin, flush=True)
-        try:
-            line = _line(process, self.timeout)
-        except TimeoutError:
-            self.stop()
-            return "hangs", f"no answer in {self.timeout:g} s"
-        if not line:
-            return "kills the process", f"exit status {self.stop()}"
-        word, details = json.loads(line)
-        return str(word), str(details)
-
-    def start(self) -> subprocess.Popen[str]:
-        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        self.process = subprocess.Popen(self.command, **pipes, stderr=subprocess.DEVNULL, text=True)
-        if _line(self.process, FIRST_WAIT).strip() != READY:
-            raise RuntimeError("the worker process does not start")
-        return self.process
-
-    def stop(self) -> int | None:
         if self.process is None:
+            self.start()
+        try:
+            self.pipe.send((family, number))
+            if not self.pipe.poll(self.timeout):
+                self.stop(0.0)
+                return "hangs", f"no answer in {self.timeout:g} s"
+            word, details = self.pipe.recv()
+        except (EOFError, OSError):  # the process has ended
+            return "kills the process", f"exit status {self.stop(5.0)}"
+        return word, details
+
+    def start(self) -> None:
+        self.pipe, theirs = _SPAWN.Pipe()
+        self.process = _SPAWN.Process(target=self.work, args=(theirs,), daemon=True)
+        self.process.start()
+        theirs.close()
+        if not self.pipe.poll(FIRST_WAIT) or self.pipe.recv() != READY:
+            raise RuntimeError("the worker process does not start")
+
+    def stop(self, seconds: float) -> int | None:
+        """Kill the process if it does not end within this time; return its exit status."""
+        if (process := self.process) is None:
             return None
-        process, self.process = self.process, None
-        if process.poll() is None:
-            process.kill()
-        with contextlib.suppress(BrokenPipeError), process:  # closes the pipes and waits
-            pass
-        return process.returncode
+        self.pipe.close()
+        process.join(seconds)
+        process.kill()
+        process.join()
+        self.process = None
+        return process.exitcode
 
 
-def _line(process: subprocess.Popen[str], seconds: float) -> str:
-    """Return the next line of a process, "" if it has ended; raise TimeoutError if there is none in time."""
-    assert process.stdout is not None
-    if not select.select([process.stdout], [], [], seconds)[0]:
-        raise TimeoutError
-    return process.stdout.readline()
-
-
-def work(seed: int) -> None:
-    """Run as the worker process: read a family and a number, write the outcome, and repeat."""
+def work(seed: int, pipe: Connection) -> None:
+    """Run as the worker process: receive a family and a number, send the outcome, and repeat."""
     from scripts.fuzzing.judge import judge  # noqa: PLC0415  only the worker needs the compiler
 
-    answers = sys.stdout
-    sys.stdout = sys.stderr
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 1)
+    os.dup2(nothing, 2)
     judge(Case("as it is", files()[0].read_bytes()))
-    print(READY, file=answers, flush=True)
-    for line in sys.stdin:
-        family, number = line.split()
-        outcome = judge(case(seed, family, int(number)))
-        print(json.dumps([outcome.word, outcome.details]), file=answers, flush=True)
+    pipe.send(READY)
+    while True:
+        outcome = judge(case(seed, *pipe.recv()))
+        pipe.send((outcome.word, outcome.details))
 
 
 def fuzz(
@@ -128,20 +120,19 @@ def fuzz(
     counts: collections.Counter[str] = collections.Counter()
 
     def run(_: int) -> None:
-        worker = Worker([sys.executable, __file__, "--worker", "--seed", str(seed)], timeout)
+        worker = Worker(partial(work, seed), timeout)
         for family, number in waiting:  # all threads take from the same iterator
             word, details = worker.judge(family, number)
             counts[word] += 1
             if word not in GOOD:
                 made = case(seed, family, number)
                 keep.mkdir(parents=True, exist_ok=True)
-                name = f"{family}-{seed}-{number}"
                 suffix = ".xml" if family in mjcf.FAMILIES else ".urdf"
-                (keep / f"{name}{suffix}").write_bytes(made.data)
-                (keep / f"{name}.txt").write_text(f"{made.words}\n{word}\n{details}\n", "utf-8")
+                (keep / f"{family}-{seed}-{number}{suffix}").write_bytes(made.data)
+                note = f"{made.words}\n{word}\n{details}\n"
+                (keep / f"{family}-{seed}-{number}.txt").write_text(note, "utf-8")
                 print(f"{family} {number} ({made.what}): {word}", flush=True)
-
-        worker.stop()
+        worker.stop(0.0)
 
     with ThreadPoolExecutor(jobs) as pool:
         list(pool.map(run, range(jobs)))
@@ -166,11 +157,7 @@ def main() -> int:
     option("--timeout", type=float, default=30.0, help="time limit of one robot in seconds")
     option("--only", type=int, help="test only the robot with this number in its family")
     option("--keep", type=Path, default=Path("artefacts/fuzz"), help="folder for files that cause a failure")
-    option("--worker", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.worker:
-        work(options.seed)
-        return 0
     families = options.family or FAMILIES
     asked = shares(families, options.mutants, options.robots)
     if options.only is not None:
