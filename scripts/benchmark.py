@@ -19,6 +19,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from scripts.benchmarking import sections as measured
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
 from scripts.benchmarking.machine import USES, first_uses, machine, peak_over_output
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS
-from scripts.benchmarking.tables import show
+from scripts.benchmarking.tables import machine_of, tables
 from scripts.benchmarking.timing import DifferenceError, Row
 from urdfkin.compiled.preload import only
 from urdfkin.verify.oracles import versions
@@ -53,42 +54,31 @@ class Plan:
 QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_000), 200_000)
 
 
-def rows(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> Iterator[Row]:
-    """Yield the rows of all tables; raise DifferenceError if results of two contenders differ."""
+def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
+    """Measure everything and return it as data; raise DifferenceError if results of contenders differ."""
+    name, frame = SUBJECTS[0]
     n, rounds = plan.configurations, plan.rounds
-    ways: dict[str, Iterator[Row]] = {
-        "batch": measured.batch_rows(n, contenders, rounds),
-        "single": measured.single_rows(n, contenders, rounds),
-        "checked": measured.checked_rows(n, rounds),
-        "verified": measured.verified_rows(n, rounds),
+    ways: dict[str, Iterator[Row]] = {  # generators, which measure later
+        **{name: measured.contest_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
         "joints": measured.joint_rows(plan.joints, plan.numbers, rounds),
         "frames": measured.frame_rows(plan.frame_configurations, plan.frames, rounds),
         "sizes": measured.size_rows(plan.sizes, rounds),
     }
-    for section, way in ways.items():  # each is a generator, which measures when it is asked
-        if section in sections:
-            yield from way
-
-
-def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
-    name, frame = SUBJECTS[0]
     found: dict[str, Any] = {
         "machine": machine(),
         "versions": versions(),
         "libraries": {contender.library: contender.state for contender in contenders},
-        "rounds": plan.rounds,
+        "rounds": rounds,
         "operations": dict(measured.operation_counts()),
-        "rows": [asdict(row) for row in rows(plan, sections, contenders)],
+        "rows": [asdict(row) for section, way in ways.items() if section in sections for row in way],
         "memory": [
             peak_over_output(name, frame, quantity, plan.memory, out=out)
-            for quantity in QUANTITIES
-            for out in (True, False)
-            if "memory" in sections
+            for quantity, out in product(QUANTITIES, (True, False) if "memory" in sections else ())
         ],
     }
     if "where" in sections:
-        single = measured.parts_of_calls(min(plan.configurations, 2_000), plan.rounds)
-        found["where"] = [*measured.parts_of_batches(plan.configurations, plan.rounds), *single]
+        single = measured.parts_of_calls(min(n, 2_000), rounds)
+        found["where"] = [*measured.parts_of_batches(n, rounds), *single]
     if "first" in sections:
         found["first"] = list(first_uses(name, frame, plan.first))
     return found
@@ -102,21 +92,21 @@ def main(words: Sequence[str] | None = None) -> int:
     option("--plot", type=Path, help="plot the measurements: svg, png or pdf")
     option("--only", nargs="+", choices=SECTIONS, default=SECTIONS, help="some sections")
     option("--no-peers", action="store_true", help="compare only urdfkin and Pinocchio")
-    arguments = parser.parse_args(words)
-    plan = QUICK if arguments.quick else Plan()
+    given = parser.parse_args(words)
+    contenders = ALWAYS if given.no_peers else ALWAYS + PEERS
     try:
         with only("compiled"):
-            figures = document(plan, arguments.only, ALWAYS if arguments.no_peers else ALWAYS + PEERS)
+            figures = document(QUICK if given.quick else Plan(), given.only, contenders)
     except DifferenceError as difference:
         print(f"results differ: {difference}", file=sys.stderr)
         return 1
-    show(figures)
-    if arguments.json:
-        arguments.json.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
-    if arguments.plot:
-        from scripts.benchmarking.picture import draw  # noqa: PLC0415  needs matplotlib
+    print(machine_of(figures), *(table.text for table in tables(figures)), sep="\n\n")
+    if given.json:
+        given.json.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
+    if given.plot:
+        from scripts.benchmarking.picture import draw  # noqa: PLC0415  the picture needs matplotlib
 
-        arguments.plot.write_bytes(draw(figures, arguments.plot))
+        given.plot.write_bytes(draw(figures, given.plot))
     return 0
 
 

@@ -15,6 +15,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -40,8 +41,7 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
 def cluster(*robots: Any, **how: Any) -> ValidationReport:
     """Validate with two local Dask workers; the time includes the end of the workers, but not their start."""
     with connected("local:2") as two:
-        # load the modules of the worker processes before the measurement
-        validate("planar_two_link", samples=400, executor=two)
+        validate("planar_two_link", samples=400, executor=two)  # the workers load their modules
         chunks = len(Cut(how["samples"])) * len(robots[0])
         begin, before = time.perf_counter(), time.process_time()
         report = validate(*robots, executor=two, **how)
@@ -63,14 +63,13 @@ def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> No
     validate("planar_two_link", samples=10)  # compile and load all kernels before the measurement
     wall: dict[str, list[float]] = {name: [] for name in ways}
     processor: dict[str, list[float]] = {name: [] for name in ways}
-    for _ in range(rounds):
-        for name in ways:
-            begin, before = time.perf_counter(), _processor()
-            report = WAYS[name](robots, samples=samples)
-            wall[name].append(time.perf_counter() - begin)
-            processor[name].append(_processor() - before)
-            results = sum(robot.results for robot in report.robots)
-            print(f"  {name}: {wall[name][-1]:.1f} s, processor {processor[name][-1]:.1f} s", flush=True)
+    for name in ways * rounds:
+        begin, before = time.perf_counter(), sum(os.times()[:4])  # with the finished children
+        report = WAYS[name](robots, samples=samples)
+        wall[name].append(time.perf_counter() - begin)
+        processor[name].append(sum(os.times()[:4]) - before)
+        results = sum(robot.results for robot in report.robots)
+        print(f"  {name}: {wall[name][-1]:.1f} s, processor {processor[name][-1]:.1f} s", flush=True)
     print(f"{len(robots)} robots, {samples:,} samples each, {results:,} results; {rounds} rounds")
     for name in ways:
         a_second = [results / median(seconds[name]) for seconds in (wall, processor)]
@@ -79,35 +78,27 @@ def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> No
         print(f"processor time {share:.3f} of {ways[0]}")
 
 
-def _processor() -> float:
-    """Return the processor time in seconds of this process and its finished children."""
-    return sum(os.times()[:4])
-
-
 def measure_chunk() -> None:
-    """Print the processor time to compute, store, read and add a chunk, in milliseconds."""
+    def cost(work: Callable[[int], object], times: int = 100) -> float:
+        """Return the median processor time in milliseconds."""
+        moments = [time.process_time()]
+        for i in range(times):
+            work(i)
+            moments.append(time.process_time())
+        return 1e3 * median(after - before for before, after in pairwise(moments))
+
     robot, cut = subject("ur5"), Cut(100_000)
     chunk = cut.chunk(robot, 0, 1)
     found = run_chunk(chunk)
-    print(f"a chunk of {chunk.configurations} samples: {_cost(lambda _: run_chunk(chunk), 3):.0f} ms")
+    print(f"a chunk of {chunk.configurations} samples: {cost(lambda _: run_chunk(chunk), 3):.0f} ms")
     manifest = Manifest.of([robot], cut.samples, 0, "now")
     with tempfile.TemporaryDirectory() as folder, opened(Path(folder) / "s", manifest, print) as kept:
-        print(f"time to store it: {_cost(lambda i: kept.keep(0, i, found)):.2f} ms")
-        print(f"time to read it: {_cost(lambda i: kept.answer(0, i)):.2f} ms")
-    print(f"time to add two: {_cost(lambda _: found + found):.2f} ms")
+        print(f"time to store it: {cost(lambda i: kept.keep(0, i, found)):.2f} ms")
+        print(f"time to read it: {cost(lambda i: kept.answer(0, i)):.2f} ms")
+    print(f"time to add two: {cost(lambda _: found + found):.2f} ms")
 
 
-def _cost(work: Callable[[int], object], times: int = 100) -> float:
-    """Return the median processor time in milliseconds."""
-    seconds = []
-    for i in range(times):
-        begin = time.process_time()
-        work(i)
-        seconds.append(time.process_time() - begin)
-    return 1e3 * median(seconds)
-
-
-def main() -> None:
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("robots", nargs="*")
     parser.add_argument("--all", action="store_true", help="the robots of example-robot-data")
@@ -118,10 +109,6 @@ def main() -> None:
     given = parser.parse_args()
     if given.chunk:
         measure_chunk()
-        return
-    robots = list(examples()) if given.all else given.robots
-    measure(robots, given.ways.split(","), given.samples, given.rounds)
-
-
-if __name__ == "__main__":
-    main()
+    else:
+        robots = list(examples()) if given.all else given.robots
+        measure(robots, given.ways.split(","), given.samples, given.rounds)

@@ -37,38 +37,16 @@ _UNFOLD = """
 """
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("--robots", type=int, default=2000)
-    parser.add_argument("--rounds", type=int, default=5)
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        page, begin = Path(folder) / "fleet.html", time.process_time()
-        (page.parent / "fleet-robots").mkdir()
-        sizes = [
-            (page.parent / place).write_text(text, encoding="utf-8")
-            for place, text in as_files(fleet(given.robots), page.name)
-        ]
-        print(f"written: {time.process_time() - begin:.1f} s of processor, {len(sizes)} files,", end=" ")
-        print(f"the page {sizes[-1] / 1e6:.2f} MB, {sum(sizes) / 1e6:.0f} MB together")
-        rounds = [_opened(page, Path(folder) / f"profile-{i}", given.robots) for i in range(given.rounds)]
-    for name in rounds[0]:
-        print(f"{name}: {median(times[name] for times in rounds):.0f} ms", end=" ")
-        print(f"({', '.join(f'{times[name]:.0f}' for times in rounds)})")
-
-
 def fleet(robots: int) -> Document:
+    """Return a report of `robots` robots: the results of a few, under many names."""
     document = validate(list(_ROBOTS), samples=10).as_dict()
-    names = (f"fleet/{i:04}.urdf" for i in range(robots))
-    document["robots"] = [
-        robot | {"source": name}
-        for name, robot in zip(names, islice(cycle(document["robots"]), robots), strict=True)
-    ]
+    few = islice(cycle(document["robots"]), robots)
+    document["robots"] = [robot | {"source": f"fleet/{i:04}.urdf"} for i, robot in enumerate(few)]
     document["asked"] = robots
     return document
 
 
-def _opened(page: Path, profile: Path, robots: int) -> dict[str, float]:
+def measured(page: Path, profile: Path, robots: int) -> dict[str, float]:
     with opened(profile) as browser:
         browser.chrome.get("about:blank")
         browser.open(page)
@@ -82,4 +60,20 @@ def _opened(page: Path, profile: Path, robots: int) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--robots", type=int, default=2000)
+    parser.add_argument("--rounds", type=int, default=5)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        page, begin = Path(folder) / "fleet.html", time.process_time()
+        (page.parent / "fleet-robots").mkdir()
+        sizes = [
+            (page.parent / place).write_text(text, encoding="utf-8")
+            for place, text in as_files(fleet(given.robots), page.name)
+        ]
+        print(f"written: {time.process_time() - begin:.1f} s of processor, {len(sizes)} files,", end=" ")
+        print(f"the page {sizes[-1] / 1e6:.2f} MB, {sum(sizes) / 1e6:.0f} MB together")
+        rounds = [measured(page, Path(folder) / f"profile-{i}", given.robots) for i in range(given.rounds)]
+    for name in rounds[0]:
+        print(f"{name}: {median(times[name] for times in rounds):.0f} ms", end=" ")
+        print(f"({', '.join(f'{times[name]:.0f}' for times in rounds)})")

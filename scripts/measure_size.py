@@ -10,6 +10,7 @@ example by scripts/test.sh. Python, pip and bytecode are not counted.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import importlib.metadata
 import sys
 from collections.abc import Iterable
@@ -56,18 +57,6 @@ def own() -> int:
     return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")
 
 
-def installed_extras(core: dict[str, int]) -> dict[str, tuple[int, int]]:
-    """Return, for each installed extra, the number of packages that it adds, and their size in bytes."""
-    sizes = {}
-    for extra in EXTRAS:
-        try:
-            added = {name: size for name, size in closure("urdfkin", [extra]).items() if name not in core}
-        except importlib.metadata.PackageNotFoundError:
-            continue
-        sizes[extra] = (len(added), sum(added.values()))
-    return sizes
-
-
 def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tuple[int, int]]) -> str:
     total, meshes = sum(core.values()), sum(core.values()) - sum(lean.values())
     robots, pinocchio = core["example-robot-data"], sum(closure("pin").values())
@@ -83,13 +72,17 @@ def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tupl
     return text + table(("extra", "additional packages", "size"), rows)
 
 
-def main() -> None:
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Measure the size of an installation.")
     parser.add_argument("--print", action="store_true", help="print the sizes, and do not write the page")
-    only_print = vars(parser.parse_args())["print"]
+    only_print = parser.parse_args().print
     core = closure("urdfkin") | {"urdfkin": own()}
     lean = closure("urdfkin", without="yourdfpy") | {"urdfkin": own()}
-    extras = installed_extras(core)
+    extras = {}
+    for extra in EXTRAS:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            added = {name: size for name, size in closure("urdfkin", [extra]).items() if name not in core}
+            extras[extra] = (len(added), sum(added.values()))
     sizes = dict(sorted(core.items(), key=lambda item: -item[1])[:10]) | {
         f"urdfkin and the {len(core) - 1} packages that it needs": sum(core.values()),
         f"these without the packages of yourdfpy: {len(lean)} packages": sum(lean.values()),
@@ -100,13 +93,7 @@ def main() -> None:
     for name, size in sizes.items():
         print(f"{size / 1e6:7.0f} MB  {name}")
     print(f"only yourdfpy needs: {', '.join(sorted(core.keys() - lean.keys()))}")
-    if only_print:
-        return
-    if len(extras) < len(EXTRAS):
-        missing = ", ".join(set(EXTRAS) - extras.keys())
+    if missing := ", ".join(set(EXTRAS) - extras.keys()) * (not only_print):
         sys.exit(f"the page is not written: install these extras first: {missing}")
-    insert(PAGE, size=sentences(core, lean, extras))
-
-
-if __name__ == "__main__":
-    main()
+    if not only_print:
+        insert(PAGE, size=sentences(core, lean, extras))

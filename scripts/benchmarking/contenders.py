@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from importlib import metadata, util
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -17,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from scripts.benchmarking import generated
-from scripts.benchmarking.subject import QUANTITIES, Subject, bare_urdf
+from scripts.benchmarking.subject import Subject, bare_urdf
 from scripts.benchmarking.timing import Calls, Work
 from urdfkin.compiled.plan import StepField
 from urdfkin.kinematics.arithmetic import bound
@@ -74,52 +75,41 @@ class Contender:
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
     """Yield the timed tasks for a batch, with different threads and memory; one only writes the output."""
-    method = getattr(subject.robot, quantity)
-    inputs = subject.inputs(quantity, subject.n)
-    out = np.empty((subject.n, *subject.width(quantity)))
+    method, n = getattr(subject.robot, quantity), subject.n
+    inputs = subject.inputs(quantity, n)
+    out, own, floor = np.empty((3, n, *subject.width(quantity)))
     last: list[FloatArray] = []
-
-    def into(threads: int) -> Callable[[], object]:
-        return lambda: method(*inputs, subject.frame, out=out, threads=threads, verify=False)
 
     def fresh() -> None:
         last[:] = [method(*inputs, subject.frame, threads=1, verify=False)]
 
-    yield Work(ONE, subject.n, into(1), lambda: out)
-    if PROCESSORS > 1:
-        yield Work(SEVERAL, subject.n, into(PROCESSORS), lambda: out)
-    yield Work(FRESH, subject.n, fresh, lambda: last[0])
-    fast, own = getattr(subject.robot.compiled(subject.frame), quantity), np.empty_like(out)
-    yield Work(COMPILED, subject.n, lambda: fast(*inputs, out=own, threads=1), lambda: own)
-    floor = np.empty_like(out)
-    yield Work(FLOOR, subject.n, lambda: floor.fill(1.0))
+    for threads in sorted({1, PROCESSORS}):
+        into = partial(method, *inputs, subject.frame, out=out, threads=threads, verify=False)
+        yield Work(ONE if threads == 1 else SEVERAL, n, into, lambda: out)
+    yield Work(FRESH, n, fresh, lambda: last[0])
+    fast = getattr(subject.robot.compiled(subject.frame), quantity)
+    yield Work(COMPILED, n, partial(fast, *inputs, out=own, threads=1), lambda: own)
+    yield Work(FLOOR, n, partial(floor.fill, 1.0))
 
 
 def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    robot, arguments = subject.robot, "q" if quantity == "jacobian" else "q, v, a"
-    names = {"fast": robot.prepare(subject.frame), "own": robot.compiled(subject.frame)}
-    lines = (
-        f"robot.{quantity}({arguments}, frame, verify=False)",
-        f"fast.{quantity}({arguments})",
-        f"fast.{quantity}({arguments}, out=out)",
-        f"own.{quantity}({arguments}, out=out)",
-    )
-    yield from _urdfkin_lines(subject, quantity, names, lines)
+    prepared = {"fast": subject.robot.prepare(subject.frame), "own": subject.robot.compiled(subject.frame)}
+    lines = ("robot.{}, frame, verify=False)", "fast.{})", "fast.{}, out=out)", "own.{}, out=out)")
+    yield from _urdfkin_lines(subject, quantity, prepared, lines)
 
 
 def checked_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    arguments = "q" if quantity == "jacobian" else "q, v, a"
-    lines = f"robot.{quantity}({arguments}, frame, verify=True)", f"fast.{quantity}({arguments})"
-    names = {"fast": subject.robot.prepare(subject.frame, verify=True)}
-    yield from _urdfkin_lines(subject, quantity, names, lines)
+    prepared = {"fast": subject.robot.prepare(subject.frame, verify=True)}
+    yield from _urdfkin_lines(subject, quantity, prepared, ("robot.{}, frame, verify=True)", "fast.{})"))
 
 
 def _urdfkin_lines(
-    subject: Subject, quantity: str, more: dict[str, Any], lines: Sequence[str]
+    subject: Subject, quantity: str, prepared: dict[str, Any], lines: Sequence[str]
 ) -> Iterator[Calls]:
     out = np.empty(subject.width(quantity))
-    names = {"robot": subject.robot, "frame": subject.frame, "out": out, **more}
+    names = {"robot": subject.robot, "frame": subject.frame, "out": out, **prepared}
     for line in lines:
+        line = line.format(f"{quantity}({'q' if quantity == 'jacobian' else 'q, v, a'}")  # noqa: PLW2901
         who, _, given = line.replace("fast", "prepared").replace("own", "compiled").partition("(")
         shown = [word for word in ("verify=False", "verify=True", "out=") if word in given]
         yield Calls(f"urdfkin, {who}({', '.join(shown)})", names, (line,))
@@ -151,37 +141,24 @@ def all_joints_calls(subject: Subject) -> Calls:
     return Calls(LOOP, names, ("compute(model, data, q)", "get(model, data, frame, aligned)"))
 
 
-def _pinocchio(subject: Subject, quantity: str) -> Iterator[Calls]:
-    yield pinocchio_calls(subject.urdf, subject.frame, quantity)
-
-
-def _pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    yield pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
-    yield _in_processes(subject, quantity)
-
-
 #: The loop and the shared arrays of a worker process.
 _here: dict[str, Any] = {}
 
 
-def _in_processes(subject: Subject, quantity: str) -> Work:
+def pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
+    """Yield a loop, and a batch by several running processes with shared memory."""
+    yield pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
     spawn: Any = multiprocessing.get_context("spawn")
     buffers, arrays = [], []
     for x in (*subject.inputs(quantity, subject.n), np.zeros((subject.n, *subject.width(quantity)))):
-        buffer = spawn.RawArray("d", x.size)
-        buffers.append((buffer, x.shape))
-        arrays.append(_array(buffer, x.shape))
+        buffers.append((spawn.RawArray("d", x.size), x.shape))
+        arrays.append(_array(*buffers[-1]))
         arrays[-1][...] = x
     pool = subject.stack.enter_context(
         ProcessPoolExecutor(PROCESSORS, spawn, _start, (subject.urdf, subject.frame, quantity, buffers))
     )
     edges = [subject.n * i // PROCESSORS for i in range(PROCESSORS + 1)]
-
-    def compute() -> None:
-        for done in [pool.submit(_share, *edges[i : i + 2]) for i in range(PROCESSORS)]:
-            done.result()
-
-    return Work(PROCESSES, subject.n, compute, lambda: arrays[-1])
+    yield Work(PROCESSES, subject.n, lambda: list(pool.map(_share, edges, edges[1:])), lambda: arrays[-1])
 
 
 def _array(buffer: Any, shape: Sequence[int]) -> FloatArray:
@@ -190,8 +167,6 @@ def _array(buffer: Any, shape: Sequence[int]) -> FloatArray:
 
 def _start(urdf: str, frame: str, quantity: str, buffers: Sequence[tuple[Any, tuple[int, ...]]]) -> None:
     """In a worker, make a model and open the shared memory."""
-    if quantity not in QUANTITIES:
-        raise ValueError(quantity)
     _here["loop"] = pinocchio_calls(urdf, frame, quantity).loop()
     _here["arrays"] = [_array(*buffer) for buffer in buffers]
 
@@ -232,16 +207,16 @@ def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
     def read(flat: FloatArray) -> FloatArray:
         return flat.reshape(-1, nv, 6).transpose(0, 2, 1)[:, LINEAR_FIRST][..., back]
 
-    who = "dynibo, loop"
     names = {"robot": robot, "frame": robot.link_id(subject.frame), "buffer": np.empty(6 * nv)}
     if quantity == "jacobian":
-        lines = ("robot.jacobian(q, frame, out=buffer)",)
-        into = ("robot.jacobian(q, frame, out=out[k])",)
-        yield Calls(who, names, lines, into, order, (6 * nv,), read)
+        lines, into = (f"robot.jacobian(q, frame, out={out})" for out in ("buffer", "out[k]"))
+        yield Calls("dynibo, loop", names, (lines,), (into,), order, (6 * nv,), read)
         return
     line = "robot.forward_acceleration_kinematics(q, v, a, frame)"
     store = (f"x = {line}", "out[k, :3] = x.linear", "out[k, 3:] = x.angular")
-    yield Calls(who, names, (line,), store, order, read_one=lambda x: np.array([*x.linear, *x.angular]))
+    yield Calls(
+        "dynibo, loop", names, (line,), store, order, read_one=lambda x: np.array([*x.linear, *x.angular])
+    )
 
 
 def breadth_first(urdf: str) -> list[str]:
@@ -430,7 +405,12 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
 
 ALWAYS = (
     Contender("urdfkin", "urdfkin", urdfkin_calls, urdfkin_batches),
-    Contender("pin", "pinocchio", _pinocchio, _pinocchio_batches),
+    Contender(
+        "pin",
+        "pinocchio",
+        lambda subject, quantity: iter([pinocchio_calls(subject.urdf, subject.frame, quantity)]),
+        pinocchio_batches,
+    ),
 )
 PEERS = (
     Contender("casadi", "casadi", batches=generated.batches, program=generated.COMPILER),

@@ -7,8 +7,9 @@ if results differ.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -41,46 +42,37 @@ ALL_JOINTS = "Pinocchio's calls for all joints, results stored"
 ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other"
 
 
-def batch_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Measure Jacobians and accelerations of a batch, compared with Pinocchio's Python loop."""
-    for subject, quantity, table in _contests("batch", n):
-        works = [work for contender in contenders for work in contender.works(subject, quantity)]
-        named = {work.who: work for work in works}
-        # The processes compute the whole batch, so that every row of all results is compared.
-        agree(works, named[PROCESSES], f"{subject.name}, {quantity}")
-        yield from measure(table, works, rounds, named[LOOP])
+def contest_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
+    """Measure Jacobians and accelerations by all contenders, compared with Pinocchio.
 
-
-def single_rows(n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
-    """Measure single calls from Python with all overhead, compared with Pinocchio's calls."""
-    for subject, quantity, table in _contests("single", n):
-        calls = [one for contender in contenders for one in contender.singles(subject, quantity)]
-        works = [one.single(subject, quantity) for one in calls]
-        reference = pinocchio_calls(subject.urdf, subject.frame, quantity)
-        agree(works, reference.batch(subject, quantity), f"{subject.name}, single {quantity}")
-        yield from measure(table, works, rounds, next(work for work in works if work.who == LOOP))
-
-
-def verified_rows(n: int, rounds: int) -> Iterator[Row]:
-    """Measure calls that check all results or only a sample, compared with Pinocchio's cheapest calls."""
-    for subject, quantity, table in _contests("verified", n):
+    Sections: a batch; single calls with all overhead; single calls with a check (`checked`); and batches of
+    which all results, a sample or none is checked (`verified`).
+    """
+    for subject, quantity, table in _contests(section, n):
+        what = f"{subject.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
         calls = pinocchio_calls(subject.urdf, subject.frame, quantity)
-        stored = replace(calls.batch(subject, quantity), who=STORED)
-        works = [*(_verified(subject, quantity, verify) for verify in (True, "sample", False)), stored]
-        works.append(replace(calls.single(subject, quantity), who=NOT_STORED))
-        if quantity == "jacobian":
-            works.append(replace(all_joints_calls(subject).batch(subject, quantity), who=ALL_JOINTS))
-        agree(works, stored, f"{subject.name}, verified {quantity}")
-        yield from measure(table, works, rounds, stored, time.thread_time)
-
-
-def checked_rows(n: int, rounds: int) -> Iterator[Row]:
-    """Measure single calls with a check, compared with Pinocchio's calls."""
-    for subject, quantity, table in _contests("checked", n):
-        calls = pinocchio_calls(subject.urdf, subject.frame, quantity)
-        works = [one.single(subject, quantity) for one in (*checked_calls(subject, quantity), calls)]
-        agree(works, calls.batch(subject, quantity), f"{subject.name}, checked {quantity}")
-        yield from measure(table, works, rounds, works[-1], time.thread_time)
+        loop = calls.batch(subject, quantity)
+        if section == "batch":
+            works = [work for contender in contenders for work in contender.works(subject, quantity)]
+            # The processes compute the whole batch, so that every row of all results is compared.
+            loop = next(work for work in works if work.who == PROCESSES)
+            baseline = next(work for work in works if work.who == LOOP)
+        elif section == "single":
+            found = [one for contender in contenders for one in contender.singles(subject, quantity)]
+            works = [one.single(subject, quantity) for one in found]
+            baseline = next(work for work in works if work.who == LOOP)
+        elif section == "checked":
+            works = [one.single(subject, quantity) for one in (*checked_calls(subject, quantity), calls)]
+            baseline = works[-1]
+        else:
+            baseline = loop = replace(loop, who=STORED)
+            works = [*(_verified(subject, quantity, verify) for verify in (True, "sample", False)), loop]
+            works.append(replace(calls.single(subject, quantity), who=NOT_STORED))
+            if quantity == "jacobian":
+                works.append(replace(all_joints_calls(subject).batch(subject, quantity), who=ALL_JOINTS))
+        agree(works, loop, what)
+        clock = time.perf_counter if section in ("batch", "single") else time.thread_time
+        yield from measure(table, works, rounds, baseline, clock)
 
 
 def operation_counts() -> Iterator[tuple[str, int]]:
@@ -92,10 +84,7 @@ def operation_counts() -> Iterator[tuple[str, int]]:
 def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:
     method, inputs = getattr(subject.robot, quantity), subject.inputs(quantity, subject.loop)
     out = np.empty((subject.loop, *subject.width(quantity)))
-
-    def compute() -> object:
-        return method(*inputs, subject.frame, out=out, verify=verify)
-
+    compute = partial(method, *inputs, subject.frame, out=out, verify=verify)
     return Work(f"urdfkin, verify={verify!r}", subject.loop, compute, lambda: out)
 
 
@@ -138,27 +127,21 @@ def _growth(section: str, subject: Subject, size: int, rounds: int) -> Iterator[
 def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
     """Measure how the time of placements grows with the number of frames, in one pass and in single calls."""
     with Subject(*SUBJECTS[-1], n) as subject:
-        links = subject.robot.link_names
+        robot, q, links = subject.robot, subject.q, subject.robot.link_names
         for count in sorted({min(count, len(links)) for count in counts}):
             frames = [f"link:{links[i]}" for i in np.linspace(0, len(links) - 1, count).astype(int)]
-            works = _frame_works(subject, frames)
+            out, every = np.empty((count, n, 4, 4)), np.empty((n, count, 4, 4))
+            together = partial(robot.placement, q, frames, out=every, threads=1, verify=False)
+
+            def apart(frames: list[str] = frames, out: FloatArray = out) -> FloatArray:
+                for k, frame in enumerate(frames):
+                    robot.placement(q, frame, out=out[k], threads=1, verify=False)
+                return out.swapaxes(0, 1)
+
+            works = [Work(ONE_PASS, n, together, together), Work(ONE_BY_ONE, n, apart, apart)]
             agree(works, works[1], f"{subject.name}, {count} placements")
             table = Table("frames", subject.name, "placement", 16 * count, count)
             yield from measure(table, works, rounds, works[1])
-
-
-def _frame_works(subject: Subject, frames: Sequence[str]) -> list[Work]:
-    robot, q, n = subject.robot, subject.q, subject.n
-    out, every = np.empty((len(frames), n, 4, 4)), np.empty((n, len(frames), 4, 4))
-
-    def together() -> FloatArray:
-        return robot.placement(q, frames, out=every, threads=1, verify=False)
-
-    def apart() -> None:
-        for k, frame in enumerate(frames):
-            robot.placement(q, frame, out=out[k], threads=1, verify=False)
-
-    return [Work(ONE_PASS, n, together, together), Work(ONE_BY_ONE, n, apart, lambda: out.swapaxes(0, 1))]
 
 
 # A batch runs with and without the instructions of a part; the difference is the time of the part.
@@ -182,7 +165,7 @@ def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         if quantity == "acceleration":
             # an acceleration has no Jacobian columns to compute
             works = [work for work in works if work.who != "columns"]
-        found = _times(works, rounds)
+        found = times(works, rounds)
         before, parts = np.zeros(rounds), {}
         for who, taken in found.items():
             parts[who], before = taken - before, taken
@@ -225,7 +208,7 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         works = [call.single(subject, quantity) for call in calls]
         for work in works:
             work.compute()
-        loop, function, refused, array, computed, prepared, method = _times(works, rounds).values()
+        loop, function, refused, array, computed, prepared, method = times(works, rounds).values()
         parts = {
             "Python's call of a method": function - loop,
             "its call of the forward recursion": refused - loop,
@@ -237,6 +220,16 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         yield _entry("single", subject, quantity, parts, method - loop)
 
 
+class _Empty:
+    """Methods without code, with the arguments of the methods of a prepared frame."""
+
+    def jacobian(self, q: object, out: object = None) -> object:
+        return out
+
+    def acceleration(self, q: object, v: object, a: object, out: object = None) -> object:
+        return out
+
+
 def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     q_v_a = "q" if quantity == "jacobian" else "q, v, a"
     compute, _ = single(quantity, subject.plan, Reference.LOCAL_WORLD_ALIGNED)
@@ -244,7 +237,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         "robot": subject.robot,
         "fast": subject.robot.prepare(subject.frame),
         "frame": subject.frame,
-        "function": _function(quantity),
+        "function": getattr(_Empty(), quantity),
         "compute": compute,
         "empty": np.empty,
         "shape": subject.width(quantity),
@@ -260,24 +253,6 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         f"robot.{quantity}({q_v_a}, frame, verify=False)",
     ):
         yield Calls(line, names, (line,))
-
-
-def _function(quantity: str) -> Callable[..., object]:
-    """Return a method without code that has the same arguments as a prepared frame's method."""
-
-    class Empty:
-        def jacobian(self, q: object, out: object = None) -> object:
-            return out
-
-        def acceleration(self, q: object, v: object, a: object, out: object = None) -> object:
-            return out
-
-    method: Callable[..., object] = getattr(Empty(), quantity)
-    return method
-
-
-def _times(works: list[Work], rounds: int) -> dict[str, FloatArray]:
-    return {who: np.array(values) for who, values in times(works, rounds).items()}
 
 
 def _entry(

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
-
-from rich.console import Console
-from rich.table import Table
 
 from scripts.benchmarking.contenders import COMPILED, FLOOR, ONE
 from scripts.benchmarking.generated import GENERATED
@@ -22,6 +19,37 @@ Entry = Mapping[str, Any]
 _SHARE = "times generated code"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
+#: For each section about growth: its title, and the cells of a row.
+_GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
+    "joints": (
+        "chains: the tip's result, one thread",
+        lambda row: {
+            "": f"{row['quantity']}, {row['who']}",
+            "joints": str(row["size"]),
+            "ns for one configuration": number(row["median_ns"]),
+            "ns per joint": number(row["median_ns"] / row["size"]),
+            "ns per number of the output": number(row["median_ns"] / row["numbers"]),
+        },
+    ),
+    "frames": (
+        "{robot}: placements of several links, one thread",
+        lambda row: {
+            "": row["who"],
+            "links": str(row["size"]),
+            "ns for one configuration": number(row["median_ns"]),
+            "ns per link": number(row["median_ns"] / row["size"]),
+        },
+    ),
+    "sizes": (
+        "{robot}: batches of several sizes, one thread, out= given",
+        lambda row: {
+            "": f"{row['quantity']}, {row['who']}",
+            "configurations": f"{row['size']:,}",
+            "ns for one configuration, median": number(row["median_ns"]),
+            "minimum": number(row["minimum_ns"]),
+        },
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -41,6 +69,13 @@ class Words:
     def rows(self) -> list[tuple[str, ...]]:
         return [tuple(row.values()) for row in self.cells]
 
+    @property
+    def text(self) -> str:
+        """The table in Markdown."""
+        remarks = "".join(f"\n[{i}] {remark}." for i, remark in enumerate(self.remarks, start=1))
+        cells = markdown(self.head, self.rows, left=1) + (f"\n{remarks}" if remarks else "")
+        return f"**{self.title}**\n\n{cells}"
+
 
 def number(x: float) -> str:
     """Format a number with three digits and without an exponent."""
@@ -57,41 +92,35 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
             yield _contest(section, title, rows)
     if batch := sections.get("batch"):
         yield Words("summary", "urdfkin against the others, medians", [_best(*one) for one in _groups(batch)])
-        yield _floor(batch, figures["operations"])
+        title = "lower limits of the time for one configuration, from its bytes and its operations"
+        yield Words("floor", title, [_floor(*one, figures["operations"]) for one in _groups(batch)])
     for kind, what in (("batch", "a batch, one thread"), ("single", "a single call")):
         if chosen := [entry for entry in figures.get("where", ()) if entry["kind"] == kind]:
             yield _where(f"{what}: where the time goes, ns for one configuration", chosen)
     if entries := figures.get("first"):
-        yield _first(entries)
-    for section, make in (("joints", _joints), ("frames", _frames), ("sizes", _sizes)):
+        heads = {"without stored kernels": EMPTY, "with stored kernels": KEPT}
+        times = [
+            {"": one["what"], **{head: number(one[key] / 1e3) for head, key in heads.items()}}
+            for one in entries
+        ]
+        yield Words("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
+    for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
-            yield make(rows)
+            # The rows are sorted by quantity and contender, both in the order of their first rows.
+            keys = [(row["quantity"], row["who"]) for row in rows]
+            quantities = [quantity for quantity, _ in keys]
+            rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["who"])))
+            rows = sorted(rows, key=lambda row: quantities.index(row["quantity"]))
+            yield Words(section, title.format(robot=rows[0]["robot"]), [cells(row) for row in rows])
     if figures["memory"]:
         yield _memory(figures["memory"])
 
 
-def show(figures: Mapping[str, Any], console: Console | None = None) -> None:
-    console = console or Console(width=110, highlight=False)
-    console.print(_machine(figures))
-    for words in tables(figures):
-        table = Table(title=words.title, title_justify="left", box=None, pad_edge=False, header_style="dim")
-        for i, head in enumerate(words.head):
-            table.add_column(head, justify="right" if i else "left", no_wrap=not i)
-        for row in words.rows:
-            table.add_row(*(cell.replace("[", "\\[") for cell in row))
-        console.print()
-        console.print(table)
-        for i, remark in enumerate(words.remarks):
-            console.print(f"  \\[{i + 1}] {remark}")
-
-
 def page(text: str, figures: Mapping[str, Any]) -> str:
     """Return the page with the figures in their places; raise ValueError if a place is missing or double."""
-    parts: dict[str, list[str]] = {"machine": [_machine(figures)]}
+    parts: dict[str, list[str]] = {"machine": [machine_of(figures)]}
     for words in tables(figures):
-        remarks = "".join(f"\n[{i}] {remark}." for i, remark in enumerate(words.remarks, start=1))
-        cells = markdown(words.head, words.rows, left=1) + (f"\n{remarks}" if remarks else "")
-        parts.setdefault(words.section, []).append(f"**{words.title}**\n\n{cells}")
+        parts.setdefault(words.section, []).append(words.text)
     places = re.findall(r"<!-- figures: (\w+) -->", text)
     if set(parts) - set(places) or len(places) != len(set(places)):
         raise ValueError(f"the page has places for {places}, the figures are {list(parts)}")
@@ -99,7 +128,7 @@ def page(text: str, figures: Mapping[str, Any]) -> str:
     return inserted(text, **{f"figures: {place}": part for place, part in texts.items()})
 
 
-def _machine(figures: Mapping[str, Any]) -> str:
+def machine_of(figures: Mapping[str, Any]) -> str:
     machine, versions = figures["machine"], figures["versions"]
     libraries = figures["libraries"] | {name: versions[name] for name in ("numpy", "numba")}
     return (
@@ -161,99 +190,34 @@ def _best(title: str, group: list[Entry]) -> dict[str, str]:
     }
 
 
-def _floor(rows: list[Entry], operations: Mapping[str, int]) -> Words:
+def _floor(title: str, group: list[Entry], operations: Mapping[str, int]) -> dict[str, str]:
     """Compare urdfkin's time with the time to write the output once and with the number of operations."""
-    cells = []
-    for title, group in _groups(rows):
-        who = {row["who"].partition(",")[0]: row for row in reversed(group)}
-        fill, ns = who[FLOOR], who["urdfkin"]["median_ns"]
-        size = 8 * fill["numbers"]
-        cells.append(
-            {
-                "": title,
-                "bytes written": f"{size:,}",
-                "fill, ns": number(fill["median_ns"]),
-                "operations": f"{operations[title]:,}",
-                "urdfkin, 1 thread, ns": number(ns),
-                "bytes per ns": number(size / ns),
-                "operations per ns": number(operations[title] / ns),
-            }
-        )
-    return Words(
-        "floor", "lower limits of the time for one configuration, from its bytes and its operations", cells
-    )
+    who = {row["who"].partition(",")[0]: row for row in reversed(group)}
+    fill, ns = who[FLOOR], who["urdfkin"]["median_ns"]
+    size = 8 * fill["numbers"]
+    return {
+        "": title,
+        "bytes written": f"{size:,}",
+        "fill, ns": number(fill["median_ns"]),
+        "operations": f"{operations[title]:,}",
+        "urdfkin, 1 thread, ns": number(ns),
+        "bytes per ns": number(size / ns),
+        "operations per ns": number(operations[title] / ns),
+    }
 
 
 def _where(title: str, entries: Sequence[Entry]) -> Words:
     """Return a column for each robot and quantity, with nanoseconds and the fraction of the total time."""
-    names = [f"{entry['robot']}, {entry['quantity']}" for entry in entries]
 
     def cell(entry: Entry, part: str) -> str:
         ns = entry["parts"].get(part)
         return "" if ns is None else f"{number(ns)} ({100 * ns / entry['ns']:.0f} %)"
 
+    columns = {f"{entry['robot']}, {entry['quantity']}": entry for entry in entries}
     parts = dict.fromkeys(part for entry in entries for part in entry["parts"])
-    rows = [(part, *(cell(entry, part) for entry in entries)) for part in parts]
-    rows.append(("total", *(number(entry["ns"]) for entry in entries)))
-    return Words("where", title, [dict(zip(("", *names), row, strict=True)) for row in rows])
-
-
-def _first(entries: Sequence[Entry]) -> Words:
-    heads = {"without stored kernels": EMPTY, "with stored kernels": KEPT}
-    cells = [
-        {"": entry["what"], **{head: number(entry[key] / 1e3) for head, key in heads.items()}}
-        for entry in entries
-    ]
-    return Words("first", f"{entries[0]['robot']}: processor time of a first use, s", cells)
-
-
-def _joints(rows: list[Entry]) -> Words:
-    cells = [
-        {
-            "": f"{row['quantity']}, {row['who']}",
-            "joints": str(row["size"]),
-            "ns for one configuration": number(row["median_ns"]),
-            "ns per joint": number(row["median_ns"] / row["size"]),
-            "ns per number of the output": number(row["median_ns"] / row["numbers"]),
-        }
-        for row in _together(rows)
-    ]
-    return Words("joints", "chains: the tip's result, one thread", cells)
-
-
-def _frames(rows: list[Entry]) -> Words:
-    cells = [
-        {
-            "": row["who"],
-            "links": str(row["size"]),
-            "ns for one configuration": number(row["median_ns"]),
-            "ns per link": number(row["median_ns"] / row["size"]),
-        }
-        for row in _together(rows)
-    ]
-    return Words("frames", f"{rows[0]['robot']}: placements of several links, one thread", cells)
-
-
-def _sizes(rows: list[Entry]) -> Words:
-    cells = [
-        {
-            "": f"{row['quantity']}, {row['who']}",
-            "configurations": f"{row['size']:,}",
-            "ns for one configuration, median": number(row["median_ns"]),
-            "minimum": number(row["minimum_ns"]),
-        }
-        for row in _together(rows)
-    ]
-    return Words("sizes", f"{rows[0]['robot']}: batches of several sizes, one thread, out= given", cells)
-
-
-def _together(rows: list[Entry]) -> list[Entry]:
-    """Group the rows by quantity and contender, in the order of their first rows."""
-    quantities = list(dict.fromkeys(row["quantity"] for row in rows))
-    seen = list(dict.fromkeys((row["quantity"], row["who"]) for row in rows))
-    return sorted(
-        rows, key=lambda row: (quantities.index(row["quantity"]), seen.index((row["quantity"], row["who"])))
-    )
+    cells = [{"": part} | {name: cell(entry, part) for name, entry in columns.items()} for part in parts]
+    cells.append({"": "total"} | {name: number(entry["ns"]) for name, entry in columns.items()})
+    return Words("where", title, cells)
 
 
 def _memory(entries: list[Entry]) -> Words:

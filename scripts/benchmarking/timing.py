@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import gc
 import random
-import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -82,11 +81,10 @@ def agree(works: Sequence[Work], reference: Work, what: str) -> None:
 
 def times(
     works: Sequence[Work], rounds: int, clock: Callable[[], float] = time.perf_counter
-) -> dict[str, list[float]]:
+) -> dict[str, FloatArray]:
     """Return the nanoseconds for one configuration; each work runs once in each round, in varying order."""
     found: dict[str, list[float]] = {work.who: [] for work in works}
     shuffled, order = list(works), random.Random(0)
-    collecting = gc.isenabled()
     gc.disable()
     try:
         for _ in range(rounds):
@@ -97,9 +95,8 @@ def times(
                 work.compute()
                 found[work.who].append((clock() - begin) / work.n * 1e9)
     finally:
-        if collecting:
-            gc.enable()
-    return found
+        gc.enable()
+    return {who: np.array(values) for who, values in found.items()}
 
 
 def measure(
@@ -111,15 +108,19 @@ def measure(
 ) -> list[Row]:
     """Time works that have run once before, so that no kernel is compiled while the clock runs."""
     found = times(works, rounds, clock)
-    medians = {who: statistics.median(values) for who, values in found.items()}
-
-    def row(work: Work) -> Row:
-        ratio = None if baseline is None else round(medians[baseline.who] / medians[work.who], 3)
-        own: dict[str, Any] = {"who": work.who, "n": work.n, "remark": work.remark, "ratio": ratio}
-        fastest = round(min(found[work.who]), 3)
-        return Row(**asdict(table), **own, median_ns=round(medians[work.who], 3), minimum_ns=fastest)
-
-    return [row(work) for work in works]
+    medians = {who: float(np.median(values)) for who, values in found.items()}
+    return [
+        Row(
+            **asdict(table),
+            who=work.who,
+            n=work.n,
+            median_ns=round(medians[work.who], 3),
+            minimum_ns=round(float(found[work.who].min()), 3),
+            ratio=None if baseline is None else round(medians[baseline.who] / medians[work.who], 3),
+            remark=work.remark,
+        )
+        for work in works
+    ]
 
 
 @dataclass(frozen=True)
