@@ -31,7 +31,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
@@ -41,8 +40,6 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # pytest's exit code if no test was collected
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-
-
 #: Numba compiles the source of these files, so a mutant made on import has no effect.
 #: tests/laws/test_mutation.py mutates them without the compiler.
 COMPILED = {
@@ -52,17 +49,14 @@ COMPILED = {
 }  # fmt: skip
 
 
-_OF_SLIPS = ("test_mutate", "test_named_slips")
-_OF_ROBOTS = ("test_robot.py", "verify", "laws")
-
-
 def files(parts: list[str]) -> list[Path]:
     """Return the package's files below one of the parts; raise ValueError if a part has no file."""
-    found = sorted(path for path in PACKAGE.rglob("*.py") if _below(path) not in COMPILED)
+    below = {path.relative_to(PACKAGE).as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
+    found = {name: path for name, path in below.items() if name not in COMPILED}
     for part in parts:
-        if not any(_below(path).startswith(part) for path in found):
+        if not any(name.startswith(part) for name in found):
             raise ValueError(f"{part}: no file below {PACKAGE.name}/ that can be mutated begins so")
-    return [path for path in found if not parts or _below(path).startswith(tuple(parts))]
+    return [path for name, path in found.items() if not parts or name.startswith(tuple(parts))]
 
 
 def module_of(path: Path) -> str:
@@ -70,8 +64,11 @@ def module_of(path: Path) -> str:
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
-def _below(path: Path) -> str:
-    return str(path.relative_to(PACKAGE))
+@cache
+def _texts() -> dict[Path, str]:
+    own = ("test_mutate", "test_named_slips")  # these tests make their own mutants
+    tests = (path for path in TESTS.rglob("test_*.py") if path.stem not in own)
+    return {path: path.read_text(encoding="utf-8") for path in tests}
 
 
 def near_tests(path: Path) -> list[str]:
@@ -80,25 +77,17 @@ def near_tests(path: Path) -> list[str]:
     named = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
     )
-    part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
     near = {
         test
         for test, text in _texts().items()
         if test.stem == f"test_{path.stem}" or (name in text and named.search(text))
     }
-    own = _tests_of(part, f"test_{part}.py") or _tests_of(*_OF_ROBOTS)
+    part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    for parts in ((part, f"test_{part}.py"), ("test_robot.py", "verify", "laws")):
+        if own := {test for test in _texts() if test.relative_to(TESTS).parts[0] in parts}:
+            break
     order = sorted(near | own, key=lambda test: (path.stem not in test.stem, test not in near, str(test)))
     return [str(test.relative_to(ROOT)) for test in order]
-
-
-def _tests_of(*parts: str) -> set[Path]:
-    return {test for test in _texts() if test.relative_to(TESTS).parts[0] in parts}
-
-
-@cache
-def _texts() -> dict[Path, str]:
-    tests = (path for path in TESTS.rglob("test_*.py") if path.stem not in _OF_SLIPS)
-    return {path: path.read_text(encoding="utf-8") for path in tests}
 
 
 @dataclass(frozen=True)
@@ -120,15 +109,13 @@ def named_slips() -> list[Named]:
     return [Named(**slip) for slip in tomllib.loads(text)["slip"]]
 
 
-#: Pattern of a line such as "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
-_ARGUMENT = re.compile(r"^- `(?P<place>[\w.]+)`: `(?P<what>[^`]+)`: (?P<why>\S.+)$", re.MULTILINE)
-
-
 @cache
 def argued() -> dict[tuple[str, str], str]:
     """Return the reason of each harmless mutant, by its function and its text."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
-    return {(found["place"], found["what"]): found["why"] for found in _ARGUMENT.finditer(page)}
+    # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
+    lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)
+    return {(place, what): why for place, what, why in lines}
 
 
 @dataclass(frozen=True)
@@ -136,8 +123,8 @@ class Mutant:
     """A change of a file that introduces a mistake, which a test should detect."""
 
     name: str  # name for --only
-    file: str  # the file
-    line: int  # the line
+    file: str
+    line: int
     what: str  # the text before and after
     place: str  # the function of the mutant; it identifies the mutant even after other changes of the file
 
@@ -152,25 +139,23 @@ class Outcome:
 
 
 def mutants(parts: list[str]) -> list[Mutant]:
-    return [mutant for path in files(parts) for mutant in mutants_of(path)]
-
-
-def mutants_of(path: Path) -> list[Mutant]:
-    tree, module = ast.parse(path.read_text(encoding="utf-8")), module_of(path)
-    return [
-        Mutant(
-            f"{module}:{number}",
-            str(path.relative_to(ROOT)),
-            slip.line,
-            slip.what,
-            ".".join(filter(None, (module, function_at(tree, slip.line)))),
+    found = []
+    for path in files(parts):
+        tree, module, file = (
+            ast.parse(path.read_text(encoding="utf-8")),
+            module_of(path),
+            path.relative_to(ROOT),
         )
-        for number, slip in enumerate(slips(tree))
-    ]
+        for number, slip in enumerate(slips(tree)):
+            place = ".".join(filter(None, (module, function_at(tree, slip.line))))
+            found.append(Mutant(f"{module}:{number}", str(file), slip.line, slip.what, place))
+    return found
 
 
 def judge(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
     """Run the tests on a mutant until one fails."""
+    if (mutant.place, mutant.what) in argued():
+        return Outcome(mutant, "argued", "docs/mutation.md")
     near = near_tests(ROOT / mutant.file)
     rounds = [(near, _QUICK), *([(near, _SLOW)] if slow else []), *([(["tests"], _QUICK)] if whole else [])]
     for tests, marks in rounds:
@@ -214,7 +199,7 @@ def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, s
 
 def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
     """Inject a mutant into this new process and its children, run the tests, and exit with pytest's code."""
-    import pytest  # noqa: PLC0415  only in child processes
+    import pytest  # noqa: PLC0415  only child processes run tests
 
     hook = ROOT / "scripts" / "mutating" / "hook"
     paths = [str(hook), str(ROOT), os.environ.get("PYTHONPATH", "")]
@@ -224,7 +209,7 @@ def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     sys.dont_write_bytecode = True
-    with open(output, "w") as to, open(os.devnull) as nothing:  # noqa: PTH123  as descriptors
+    with open(output, "w") as to, open(os.devnull) as nothing:  # noqa: PTH123  the next lines need descriptors
         os.dup2(nothing.fileno(), 0)
         os.dup2(to.fileno(), 1)
         os.dup2(to.fileno(), 2)
@@ -247,9 +232,19 @@ def main() -> int:
     option("--count", action="store_true", help="print the number of mutants and exit")
     options = parser.parse_args()
     try:
-        asks = _asks(options)
+        modules = {module_of(path) for path in files(options.parts)}
     except ValueError as error:
         parser.error(str(error))
+    asks: list[Callable[[], Outcome]]
+    if options.named:
+        named = [slip for slip in named_slips() if not options.parts or slip.module in modules]
+        asks = [partial(judge_named, slip, timeout=options.timeout) for slip in named]
+    else:
+        chosen = [mutant for mutant in mutants(options.parts) if options.only in (None, mutant.name)]
+        if options.sample is not None and options.sample < len(chosen):
+            chosen = random.Random(options.seed).sample(chosen, options.sample)
+        how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
+        asks = [partial(judge, mutant, **how) for mutant in chosen]
     if not asks:
         print("no mutant was selected; --count prints the number of mutants", file=sys.stderr)
         return 1
@@ -266,30 +261,6 @@ def main() -> int:
                 print(f"{outcome.word}: {where}", flush=True)
     print(f"{len(asks)} mutants: " + ", ".join(f"{n} {word}" for word, n in counts.most_common()))
     return 0 if counts.keys() <= {"noticed", "argued"} else 1
-
-
-def _asks(options: argparse.Namespace) -> list[Callable[[], Outcome]]:
-    if options.named:
-        modules = {module_of(path) for path in files(options.parts)}
-        named = [slip for slip in named_slips() if not options.parts or slip.module in modules]
-        return [partial(judge_named, slip, timeout=options.timeout) for slip in named]
-    how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
-    return [partial(_unless_argued, mutant, **how) for mutant in _chosen(options)]
-
-
-def _chosen(options: argparse.Namespace) -> list[Mutant]:
-    chosen = mutants(options.parts)
-    if options.only is not None:
-        return [mutant for mutant in chosen if mutant.name == options.only]
-    if options.sample is not None and options.sample < len(chosen):
-        return random.Random(options.seed).sample(chosen, options.sample)
-    return chosen
-
-
-def _unless_argued(mutant: Mutant, **how: Any) -> Outcome:
-    if (mutant.place, mutant.what) in argued():
-        return Outcome(mutant, "argued", "docs/mutation.md")
-    return judge(mutant, **how)
 
 
 if __name__ == "__main__":
