@@ -29,7 +29,6 @@ from dataclasses import dataclass
 from importlib import util
 from itertools import product
 from pathlib import Path
-from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -47,7 +46,6 @@ from urdfkin.report.html import as_files, as_html
 from urdfkin.report.same import as_html as same_page
 from urdfkin.robot.trajectory import line
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.document import Document
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 ROOT = Path(__file__).parents[1]
@@ -121,39 +119,43 @@ def html_checker() -> Path | None:
     return path if path.is_file() and shutil.which("java") else None
 
 
-def disagreement() -> Document:
-    """Return a report with disagreements, caused by a relative error of 1e-6 in the oracle's velocities."""
-    right = PinocchioOracle.velocities
-
-    def bent(*args: Any) -> Any:
-        return right(*args) * (1.0 + 1e-6)
-
-    with patch.object(PinocchioOracle, "velocities", bent):
-        return validate(["panda", "ur5"], samples=6).as_dict()
-
-
 def reports(folder: Path) -> dict[str, Callable[[], str]]:
+    """Return the name of each page of a report or comparison, and the function that makes it."""
+    right = PinocchioOracle.velocities
     bad = folder / "broken.urdf"
     bad.write_text('<robot name="broken"><link name="a"/><link name="a"/><joint name="j"/></robot>')
+
+    def page(robots: str | list[str], samples: int) -> str:
+        return as_html(validate(robots, samples=samples).as_dict())
+
+    def disagreement() -> str:
+        """Return a report with disagreements: the oracle's velocities have a relative error of 1e-6."""
+        with patch.object(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-6)):
+            return page(["panda", "ur5"], 6)
+
+    def months() -> str:
+        (folder / "runs").mkdir()
+        for i, report in enumerate(months_runs()):
+            (folder / "runs" / f"{i}.json").write_text(json.dumps(report), encoding="utf-8")
+        (folder / "runs" / "broken.json").write_text("{")
+        return history_page(history([folder / "runs"]))
+
     return {
-        "good": lambda: as_html(validate(["panda", "ur5", "talos"], samples=6).as_dict()),
-        "one": lambda: as_html(validate("panda", samples=20).as_dict()),
-        "unreadable": lambda: as_html(validate([str(bad), "ur5"], samples=6).as_dict()),
-        "disagreement": lambda: as_html(disagreement()),
-        "history": lambda: _history(folder),
+        "good": lambda: page(["panda", "ur5", "talos"], 6),
+        "one": lambda: page("panda", 20),
+        "unreadable": lambda: page([str(bad), "ur5"], 6),
+        "disagreement": disagreement,
+        "history": months,
         "same-same": lambda: comparison("ur5", None),
         "same-differs": lambda: comparison("ur10", None),
         "same-within": lambda: comparison("ur5_limited", 1e-3),
     }
 
 
-def _history(folder: Path) -> str:
-    runs = folder / "runs"
-    runs.mkdir()
-    for i, report in enumerate(months_runs()):
-        (runs / f"{i}.json").write_text(json.dumps(report), encoding="utf-8")
-    (runs / "broken.json").write_text("{")
-    return history_page(history([runs]))
+def comparison(b: str, within: float | None) -> str:
+    """Return the page that compares the UR5 with another robot."""
+    robots = urdfkin.load("ur5"), urdfkin.load(b)
+    return same_page(same(*robots, within=within), robots, Question(within))
 
 
 def fleet_pages(folder: Path) -> Iterator[Page]:
@@ -171,26 +173,9 @@ def fleet_pages(folder: Path) -> Iterator[Page]:
         yield Page(name, url, ready=ready, screens=screens, whole=False)
 
 
-def comparison(b: str, within: float | None) -> str:
-    robots = urdfkin.load("ur5"), urdfkin.load(b)
-    return same_page(same(*robots, within=within), robots, SameQuestion(within))
-
-
-def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
-    for name, make in reports(folder).items():
-        if wanted(name):
-            path = folder / f"{name}.html"
-            path.write_text(make(), encoding="utf-8")
-            yield Page(name, path.as_uri())
-            if name in ("good", "disagreement"):
-                yield Page(f"{name}-unfolded", path.as_uri(), UNFOLD)
-    for name, pages in (("fleet", fleet_pages), ("site", site)):
-        if wanted(name):
-            yield from pages(folder)
-
-
 def site(folder: Path) -> Iterator[Page]:
-    from mkdocs.commands.build import build  # noqa: PLC0415  of the extra `docs`
+    """Build the documentation site and yield some of its pages."""
+    from mkdocs.commands.build import build  # noqa: PLC0415  the extra `docs` has this library
     from mkdocs.config import load_config  # noqa: PLC0415
 
     logging.getLogger("mkdocs").setLevel(logging.ERROR)
@@ -201,6 +186,20 @@ def site(folder: Path) -> Iterator[Page]:
     for name in named:
         url = (folder / "site" / f"{name}.html").as_uri()
         yield Page(f"site-{name.replace('/', '-')}", url, printed=False)
+
+
+def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
+    """Write the wanted pages of reports, comparisons and the site, and yield them."""
+    for name, make in reports(folder).items():
+        if wanted(name):
+            path = folder / f"{name}.html"
+            path.write_text(make(), encoding="utf-8")
+            yield Page(name, path.as_uri())
+            if name in ("good", "disagreement"):
+                yield Page(f"{name}-unfolded", path.as_uri(), UNFOLD)
+    for name, pages in (("fleet", fleet_pages), ("site", site)):
+        if wanted(name):
+            yield from pages(folder)
 
 
 @contextmanager
@@ -234,22 +233,6 @@ def load(browser: Browser, page: Page) -> None:
     browser.settle()
 
 
-def forget(browser: Browser) -> None:
-    """Let each page start without a stored theme: the site keeps the theme of the first visit."""
-    browser.chrome.execute_cdp_cmd(
-        "Page.addScriptToEvaluateOnNewDocument", {"source": "try { localStorage.clear(); } catch {}"}
-    )
-
-
-def scroll_through(browser: Browser) -> None:
-    """Scroll to each view, so that the browser draws it, and return to the top."""
-    for k in range(browser.js("return document.querySelectorAll('canvas').length")):
-        browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
-        browser.settle()
-    browser.js("scrollTo(0, 0)")
-    browser.settle()
-
-
 def look(
     browser: Browser, page: Page, width: int, dark: bool, axe: str | None, output: Path | None = None
 ) -> list[str]:
@@ -273,15 +256,16 @@ def look(
                 print(f"  note {where}: {what[:300]}", flush=True)
     faults += [f"table {name}: {inner} pixels wide in {room}" for name, inner, room in browser.js(_CUT)]
     if output is not None:
-        scroll_through(browser)
-        _photograph(browser, output / f"{page.name}-{where.replace(' ', '-')}.png", width, dark)
+        for k in range(browser.js("return document.querySelectorAll('canvas').length")):
+            # The browser draws a view when it is on the screen.
+            browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
+            browser.settle()
+        browser.js("scrollTo(0, 0)")
+        height = browser.js("return document.documentElement.scrollHeight")
+        browser.become(width, min(6000, height), dark=dark)
+        browser.settle()
+        browser.chrome.save_screenshot(str(output / f"{page.name}-{where.replace(' ', '-')}.png"))
     return [f"{page.name}, {where}: {what}" for what in dict.fromkeys(faults)]
-
-
-def _photograph(browser: Browser, path: Path, width: int, dark: bool, most: int = 6000) -> None:
-    browser.become(width, min(most, browser.js("return document.documentElement.scrollHeight")), dark=dark)
-    browser.settle()
-    browser.chrome.save_screenshot(str(path))
 
 
 def walk(browser: Browser, page: Page) -> list[str]:
@@ -295,7 +279,7 @@ def walk(browser: Browser, page: Page) -> list[str]:
             break
         what, shown, sized, named = stop
         seen.append(what)
-        if not shown and sized and not _border_changes(browser):
+        if not shown and sized and not browser.chrome.execute_async_script(_BORDER):
             faults.append(f"no visible focus on {what}")
         if not named:
             faults.append(f"no name of {what}")
@@ -305,11 +289,6 @@ def walk(browser: Browser, page: Page) -> list[str]:
     if not seen and browser.js("return document.querySelectorAll('a, button, input, [tabindex]').length"):
         faults.append("the Tab key reaches nothing")
     return [f"{page.name}, keyboard: {what}" for what in dict.fromkeys(faults)]
-
-
-def _border_changes(browser: Browser) -> bool:
-    """Return whether the focus changes the border of an element, after a transition."""
-    return bool(browser.chrome.execute_async_script(_BORDER))
 
 
 def html_errors(page: Page, jar: Path) -> list[str]:
@@ -368,19 +347,20 @@ def main() -> None:
         return name.startswith(tuple(given.only))
 
     def visit(browser: Browser, page: Page) -> None:
+        # The site keeps the theme of the first visit.
+        script = {"source": "try { localStorage.clear(); } catch {}"}
+        browser.chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
         found = audit(browser, page, given.output, axe, jar)
         faults.extend(found)
         print(f"{page.name}: {len(found)} faults", *found, sep="\n  ", flush=True)
 
     with tempfile.TemporaryDirectory() as folder:
         with opened(Path(folder) / "profile", flags=(_MOUSE,)) as browser:
-            forget(browser)
             for page in made(Path(folder), wanted):
                 visit(browser, page)
         for plays in (False, True) if wanted("viewer") else ():
             profile = Path(folder) / f"viewer-{plays}"
             with opened(profile, flags=(_MOUSE,), draws=False) as browser, viewer(plays) as page:
-                forget(browser)
                 visit(browser, page)
     print(f"{len(faults)} faults")
     sys.exit(bool(faults))
