@@ -57,14 +57,10 @@ def _robot(*joints: str) -> str:
     return f'<robot name="r">{compiler}{links}{"".join(joints)}</robot>'
 
 
-def _axis(xyz: str) -> str:
-    return f'<axis xyz="{xyz}"/>'
-
-
-ARM = _robot(
-    _joint("c", "revolute", "base", "l1", _axis("0 0 1")),
-    _joint("b", "revolute", "l1", "l2", _axis("0 1 0")),
-    _joint("a", "revolute", "l2", "l3", _axis("0.6 0 0.8")),
+ARM = _robot(  # the joints are in reverse alphabetical order
+    _joint("c", "revolute", "base", "l1", '<axis xyz="0 0 1"/>'),
+    _joint("b", "revolute", "l1", "l2", '<axis xyz="0 1 0"/>'),
+    _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
 #: A robot that shows the order of coordinates: two limbs at the base, a third limb at the first.
 LIMBS = _robot(
@@ -100,14 +96,10 @@ _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
 )
-#: The package (on PyPI) of each library that tests/model/conventions/libraries.py uses.
+#: The package on PyPI of a library in tests/model/conventions/libraries.py, if its name is another one.
 _DISTRIBUTIONS = {
     "pinocchio": "pin",
-    "mujoco": "mujoco",
-    "drake": "drake",
-    "idyntree": "idyntree",
     "rtb": "roboticstoolbox-python",
-    "newton": "newton",
     "newton-usd": "newton",
     "usd": "usd-exchange",
 }
@@ -200,12 +192,14 @@ class MeasuredMotion:
         return six
 
 
-def rows() -> list[Row]:
-    asked = MeasuredMotion()
-    return [*_six_vectors(asked), _accelerations(asked), *_layout(), *_free()]
+def rows() -> Iterator[Row]:
+    yield from _motions(MeasuredMotion())
+    yield from _layout()
+    yield from _free()
 
 
-def _six_vectors(asked: MeasuredMotion) -> Iterator[Row]:
+def _motions(asked: MeasuredMotion) -> Iterator[Row]:
+    """Yield the rows about velocities, Jacobians and accelerations."""
     robot, readings, frame = asked.robot, asked.velocity_readings(), (asked.model, asked.data, asked.frame)
     for name, local in (("local_world_aligned", 0), ("local", 1), ("world", None)):
         theirs = pin.getFrameVelocity(*frame, getattr(pin, name.upper())).vector
@@ -224,38 +218,32 @@ def _six_vectors(asked: MeasuredMotion) -> Iterator[Row]:
         which(pin.getFrameJacobian(*frame, pin.LOCAL_WORLD_ALIGNED) @ asked.v, readings),
         f"`mj_jac`, `jacp` above `jacr`: {which(columns @ asked.v, readings)}",
     )
+    _, p, v, w, _, _ = asked.motion()
+    com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
+    at_com = "[angular; linear] of the body point at the tree's centre of mass, in world axes"
+    points = {
+        at_com: np.concatenate((w, v + np.cross(w, com - p))),
+        "[angular; linear] of the frame's origin, in world axes": np.concatenate((w, v)),
+    }
     stored = asked.data.v[asked.model.frames[asked.frame].parentJoint].vector
     yield (
         "velocity stored in the data structure",
         "none",
         f"`data.v`: {which(stored, readings)}",
-        f"`cvel`: {which(np.array(asked.mj_data.cvel[asked.body]), _about(asked))}",
+        f"`cvel`: {which(np.array(asked.mj_data.cvel[asked.body]), points)}",
     )
-
-
-def _about(asked: MeasuredMotion) -> dict[str, FloatArray]:
-    """Return candidate velocities of further points of the body."""
-    _, p, v, w, _, _ = asked.motion()
-    com = asked.mj_data.subtree_com[asked.mj_model.body_rootid[asked.body]]
-    at_com = "[angular; linear] of the body point at the tree's centre of mass, in world axes"
-    return {
-        at_com: np.concatenate((w, v + np.cross(w, com - p))),
-        "[angular; linear] of the frame's origin, in world axes": np.concatenate((w, v)),
-    }
-
-
-def _accelerations(asked: MeasuredMotion) -> Row:
-    readings, flipped = asked.acceleration_readings(flipped=False), asked.acceleration_readings(flipped=True)
-    frame = asked.model, asked.data, asked.frame, pin.LOCAL_WORLD_ALIGNED
-    ours = which(asked.robot.acceleration(asked.q, asked.v, asked.a, "l3"), readings)
-    theirs = which(pin.getFrameAcceleration(*frame).vector, readings)
-    classical = which(pin.getFrameClassicalAcceleration(*frame).vector, readings)
-    mujocos = which(asked.mujocos(mujoco.mj_objectAcceleration, 0), flipped)
-    return (
+    linear_first = asked.acceleration_readings(flipped=False)
+    ours = which(robot.acceleration(asked.q, asked.v, asked.a, "l3"), linear_first)
+    spatial, classical = (
+        which(get(*frame, pin.LOCAL_WORLD_ALIGNED).vector, linear_first)
+        for get in (pin.getFrameAcceleration, pin.getFrameClassicalAcceleration)
+    )
+    six = asked.mujocos(mujoco.mj_objectAcceleration, 0)
+    yield (
         "acceleration, in world axes",
         f"`acceleration`: {ours}",
-        f"`getFrameAcceleration`: {theirs}; `getFrameClassicalAcceleration`: {classical}",
-        f"`mj_objectAcceleration`: {mujocos}, [angular; linear]",
+        f"`getFrameAcceleration`: {spatial}; `getFrameClassicalAcceleration`: {classical}",
+        f"`mj_objectAcceleration`: {which(six, asked.acceleration_readings(flipped=True))}, [angular; linear]",
     )
 
 
@@ -323,12 +311,12 @@ def _readers(text: str) -> tuple[str, str, str]:
 
 
 def _free() -> Iterator[Row]:
+    """Yield the two rows of the table about a free body: the order of q, and the axes of v."""
     rng = np.random.default_rng(1)
     xyzw = rng.normal(size=4)
     xyzw /= np.linalg.norm(xyzw)
     p, rates = rng.normal(size=3), rng.normal(size=6)
-    robot = urdfkin.load(FREE_URDF)
-    R = robot.placement([*p, *xyzw], "l1")[:3, :3]
+    q, robot = np.array([*p, *xyzw]), urdfkin.load(FREE_URDF)
     model: Any = pin.buildModelFromXML(FREE_URDF)
     data, frame = model.createData(), model.getFrameId("l1")
     mj_model: Any = mujoco.MjModel.from_xml_string(FREE)
@@ -344,26 +332,24 @@ def _free() -> Iterator[Row]:
         pin.framesForwardKinematics(model, data, q)
         return np.array(data.oMf[frame].rotation)
 
+    R = robot.placement(q, "l1")[:3, :3]
     orders = {
-        "x, y, z, then qx, qy, qz, qw": np.array([*p, *xyzw]),
+        "x, y, z, then qx, qy, qz, qw": q,
         "x, y, z, then qw, qx, qy, qz": np.array([*p, *np.roll(xyzw, 1)]),
     }
-
-    def layout(turned: Callable[[FloatArray], FloatArray]) -> str:
-        return which(R, {name: turned(q) for name, q in orders.items()})
-
-    ours = layout(lambda q: robot.placement(q, "l1")[:3, :3])
-    yield "q of a free body", ours, layout(pinocchios), layout(mujocos)
+    rotations = (lambda q: robot.placement(q, "l1")[:3, :3]), pinocchios, mujocos
+    ours, theirs, third = (which(R, {name: R_of(q) for name, q in orders.items()}) for R_of in rotations)
+    yield "q of a free body", ours, theirs, third
     axes = {
         "both in the body's own axes": np.concatenate((R @ rates[:3], R @ rates[3:])),
         "linear in world axes, angular in the body's own": np.concatenate((rates[:3], R @ rates[3:])),
         "both in world axes": rates,
     }
-    six, q = np.empty(6), np.array([*p, *xyzw])
+    six = np.empty(6)
     mujoco.mj_objectVelocity(mj_model, mj_data, mujoco.mjtObj.mjOBJ_XBODY, 1, six, 0)
     pin.forwardKinematics(model, data, q, rates)
-    theirs = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
-    found = robot.velocity(q, rates, "l1"), theirs, np.roll(six, 3)
+    of_pinocchio = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
+    found = robot.velocity(q, rates, "l1"), of_pinocchio, np.roll(six, 3)
     yield "v of a free body", which(found[0], axes), which(found[1], axes), which(found[2], axes)
 
 
@@ -374,15 +360,18 @@ def _table(names: tuple[str, ...]) -> str:
 
 
 def _cells(how: Convention) -> dict[str, str]:
-    order = "no known rule" if how.order == "given" else how.order.replace("file", "place in the file")
-    order = {"name": "by name", "place in the file": "that of the file"}.get(order, order)
+    order = {"given": "no known rule", "name": "by name", "file": "that of the file"}.get(
+        how.order, how.order.replace("file", "place in the file")
+    )
     parts = ["x, y, z", f"q{', q'.join(how.quaternion)}"]
     q = ", then ".join(parts if how.base_q == "position first" else parts[::-1])
     axes = {"body": "its own axes", "parent": "world axes"}
     v = [f"linear in {axes[how.linear]}", f"angular in {axes[how.angular]}"]
     v = v if how.base_v == "linear first" else v[::-1]
     free = how.name not in ("rtb", "kdl")
-    links = "".join(f" [{k}]({_address(source)})" for k, source in enumerate(how.sources, 1))
+    links = "".join(
+        f" [{k}]({source.split(' ', maxsplit=1)[0].rstrip(':')})" for k, source in enumerate(how.sources, 1)
+    )
     return {
         "order of joints": order,
         "names of joints": {"urdf": "those of the URDF", "usd": "USD, `1` is `tn__1_`"}.get(
@@ -401,20 +390,20 @@ def _cells(how: Convention) -> dict[str, str]:
 
 
 def measure() -> None:
-    from tests.model.conventions.libraries import LIBRARIES  # noqa: PLC0415  needs pytest
+    from tests.model.conventions.libraries import LIBRARIES  # noqa: PLC0415  this module needs pytest
 
     for name, library in LIBRARIES.items():
+        package = _DISTRIBUTIONS.get(name, name)
         try:
-            version = metadata.version(_DISTRIBUTIONS[name])
+            line = f'measured = "{package} {metadata.version(package)}, {_measured(name, library)}"'
         except metadata.PackageNotFoundError:
             continue
-        line = f'measured = "{_DISTRIBUTIONS[name]} {version}, {_measured(name, library)}"\n'
         head, mark, rest = DATA.read_text("utf-8").partition(f"[{name}]\n")
         own, blank, others = rest.partition("\n\n")
-        kept = [row for row in own.split("\n") if not row.startswith("measured = ")]
-        at = kept.index('evidence = "measured"') + 1
-        kept.insert(at, line.rstrip())
-        DATA.write_text(head + mark + "\n".join(kept) + blank + others, "utf-8")
+        own = re.sub(r"\nmeasured = .*", "", own).replace(
+            'evidence = "measured"', f'evidence = "measured"\n{line}'
+        )
+        DATA.write_text(head + mark + own + blank + others, "utf-8")
 
 
 def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
@@ -440,10 +429,6 @@ def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
         worst = max(worst, *(float(found.max(initial=0.0)) for found, _ in pairs))
         share = max(share, *(float((x[bound > 0] / bound[bound > 0]).max(initial=0.0)) for x, bound in pairs))
     return f"{agree} of {len(robots)} robots, at most {worst:.0e} off, {100 * share:.2g} % of the bound"
-
-
-def _address(source: str) -> str:
-    return source.split(" ", maxsplit=1)[0].rstrip(":")
 
 
 def page() -> str:
