@@ -50,10 +50,7 @@ from urdfkin.urdf.catalogue import examples
 PAGE = DOCS / "export.md"
 _STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wshadow", "-Werror")
 #: Compiled languages, each with its suffix, compilers and options.
-_COMPILED = (
-    ("c", ".c", ("gcc", "clang"), _STRICT),
-    ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])),
-)
+_COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), ("-std=c++11", *_STRICT[1:])))
 _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)

@@ -204,10 +204,7 @@ def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
     hook = ROOT / "scripts" / "mutating" / "hook"
     paths = [str(hook), str(ROOT), os.environ.get("PYTHONPATH", "")]
     os.chdir(ROOT)
-    os.environ |= slip | {
-        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
+    os.environ |= slip | {"PYTHONPATH": os.pathsep.join(filter(None, paths)), "PYTHONDONTWRITEBYTECODE": "1"}
     sys.dont_write_bytecode = True
     with open(output, "w") as to, open(os.devnull) as nothing:  # noqa: PTH123  the next lines need descriptors
         os.dup2(nothing.fileno(), 0)

@@ -84,9 +84,7 @@ TOOLS = {
         ".xml",
     ),
     "mjcf-urdf-simple-converter": Tool(
-        "mujoco",
-        "from mjcf_urdf_simple_converter import convert\nconvert(source, to + '.urdf')",
-        ".urdf",
+        "mujoco", "from mjcf_urdf_simple_converter import convert\nconvert(source, to + '.urdf')", ".urdf"
     ),
     "nvidia-srl-usd-to-urdf": Tool(
         "urdf-usd-converter",
