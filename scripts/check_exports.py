@@ -111,23 +111,32 @@ def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
 
 
 def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
-    wanted = QUANTITIES if robot.nv else ("placement",)
     with tempfile.TemporaryDirectory() as folder:
-        written = code(robot, frame, wanted)
+        written = code(robot, frame, QUANTITIES if robot.nv else ("placement",))
         found = dict(shares(written, Path(folder), ways))
     good = all(share <= 1.0 for share in found.values()) and written.proof.certificate.verified
     return {"good": good, **found}
 
 
 def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
-    stored = {(line["robot"], line["frame"]) for line in lines_of(keep)}
-    here: list[dict[str, Any]] = []
+    """Check every leaf or tip that has no stored result, and print a summary; return 1 for an error."""
+    lines = lines_of(keep)
+    stored = {(line["robot"], line["frame"]) for line in lines}
     for name, robot, frame in subjects(tips):
-        if (name, frame) in stored:
-            continue
-        here.append({"robot": name, "frame": frame, **found_of(robot, frame, ways)})
-        store(keep, json.dumps(here[-1]))
-    return tell(lines_of(keep) if keep else here)
+        if (name, frame) not in stored:
+            lines.append({"robot": name, "frame": frame, **found_of(robot, frame, ways)})
+            store(keep, json.dumps(lines[-1]))
+    wrong = [line for line in lines if not line["good"]]
+    for line in wrong:
+        print("WRONG", line)
+    found = {(line["robot"], line["frame"]) for line in lines}
+    trees = {name: urdfkin.load(name).tree for name in examples()}
+    leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
+    counts = f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots"
+    others = f"{len(found - leaves)} tips that are not leaves"
+    print(f"{counts}, {others}; {len(wrong)} outside the bound or unverified")
+    tell(lines)
+    return bool(wrong)
 
 
 def check_library(library: str, environment: Path, package: str | None, keep: Path | None) -> int:
@@ -147,14 +156,9 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
             for line in process.stdout or ():
                 stored.append(json.loads(line))
                 store(keep, line.rstrip())
-    wrong, worst = 0, dict[str, float]()
-    for checked in stored:
-        found = {way: share for way, share in checked.items() if isinstance(share, float)}
-        wrong += not all(share <= 1.0 for share in found.values())
-        worst |= {way: max(share, worst.get(way, 0.0)) for way, share in found.items()}
+    wrong = sum(not all(x <= 1.0 for x in line.values() if isinstance(x, float)) for line in stored)
     print(f"{len(stored)} of {len(paths)} files, {wrong} with an error outside the bound")
-    print("largest ratio of an error to its bound:")
-    print(", ".join(f"{way} {share:.2g}" for way, share in worst.items()))
+    tell(stored)
     return int(wrong > 0 or len(stored) < len(paths) or process.returncode != 0)
 
 
@@ -184,37 +188,29 @@ def store(keep: Path | None, line: str) -> None:
             print(line, file=file)
 
 
-def tell(lines: Sequence[dict[str, Any]]) -> int:
-    wrong = [line for line in lines if not line["good"]]
-    for line in wrong:
-        print("WRONG", line)
+def tell(lines: Sequence[dict[str, Any]]) -> None:
+    """Print the largest error of each way."""
     ways = sorted({way for line in lines for way, share in line.items() if isinstance(share, float)})
     worst = ", ".join(f"{way} {max(line.get(way, 0.0) for line in lines):.2g}" for way in ways)
-    found = {(line["robot"], line["frame"]) for line in lines}
-    trees = {name: urdfkin.load(name).tree for name in examples()}
-    leaves = {(name, tree.frame_name(leaf)) for name, tree in trees.items() for leaf in tree.leaves()}
-    counts = f"{len(found & leaves)} of {len(leaves)} leaves of {len(trees)} robots"
-    others = f"{len(found - leaves)} tips that are not leaves"
-    print(f"{counts}, {others}; {len(wrong)} outside the bound or unverified")
     print(f"worst error as a share of the bound: {worst}")
-    return bool(wrong)
 
 
-def sizes() -> str:
+def page(text: str) -> str:
+    """Return the page with the sizes of the code for three frames and each quantity."""
     rows = []
     frames = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), (chain_urdf(100), "tip")
     for (source, frame), quantity in product(frames, QUANTITIES):
         robot = urdfkin.load(source)
         written = code(robot, frame, (quantity,))
-        (function,) = written.functions
         lines = write(written, "c").partition("#ifdef " + written.name.upper() + "_MAIN")[0]
-        sizes = f"{function.operations:,}", f"{lines.count(chr(10)):,}", f"{len(lines) / 1000:.0f}"
+        sizes = (
+            f"{written.functions[0].operations:,}",
+            f"{lines.count(chr(10)):,}",
+            f"{len(lines) / 1000:.0f}",
+        )
         rows.append((f"{robot.name}, {frame}", quantity, *sizes))
-    return table(("robot, frame", "quantity", "operations", "lines of C", "kB"), rows, left=2)
-
-
-def page(text: str) -> str:
-    return inserted(text, sizes=sizes())
+    heads = ("robot, frame", "quantity", "operations", "lines of C", "kB")
+    return inserted(text, sizes=table(heads, rows, left=2))
 
 
 def main(words: Sequence[str] | None = None) -> int:

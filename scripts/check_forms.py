@@ -24,6 +24,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,11 @@ SAMPLES = 4
 #: Octave's symbolic package takes 20 s for six joints, so it only computes 6 tables with at most 4 joints.
 FEW, SMALL = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
-_PACKAGE = "try, pkg load symbolic, catch, disp('missing'), exit(0), end"
+#: The first line of Octave's program for a format.
+_FIRST = {
+    "matlab-symbolic": "try, pkg load symbolic, catch, disp('missing'), exit(0), end",
+    "matlab-rst": f"addpath('{Path(__file__).parent / 'forms' / 'octave'}');",
+}
 _DOCUMENT = r"""\documentclass{article}
 \usepackage{amsmath,booktabs,graphicx}
 \usepackage[utf8]{inputenc}
@@ -77,28 +82,24 @@ class Job:
 
 
 Poses = list[FloatArray]
+#: The poses of all jobs; the folder is for files.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
-def in_python(form: str) -> Run:
-    def run(jobs: Sequence[Job], folder: Path) -> Poses:
-        library = form if form != "ets" else "roboticstoolbox"
-        if importlib.util.find_spec(library) is None:
-            raise Missing(library)
-        return [np.array(poses.poses(form, export(job.table, form), job.given(form))) for job in jobs]
-
-    return run
+def in_python(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
+    library = form if form != "ets" else "roboticstoolbox"
+    if importlib.util.find_spec(library) is None:
+        raise Missing(library)
+    return [np.array(poses.poses(form, export(job.table, form), job.given(form))) for job in jobs]
 
 
-def elsewhere(form: str, interpreter: str) -> Run:
-    def run(jobs: Sequence[Job], folder: Path) -> Poses:
-        given, found = folder / "jobs.json", folder / "poses.json"
-        data = [{"form": form, "text": export(job.table, form), "q": job.q.tolist()} for job in jobs]
-        given.write_text(json.dumps(data), "utf-8")
-        subprocess.run([interpreter, poses.__file__, str(given), str(found)], check=True)
-        return [np.array(one) for one in json.loads(found.read_text("utf-8"))]
-
-    return run
+def elsewhere(form: str, interpreter: str, jobs: Sequence[Job], folder: Path) -> Poses:
+    """Run the Python formats in another interpreter."""
+    given, found = folder / "jobs.json", folder / "poses.json"
+    data = [{"form": form, "text": export(job.table, form), "q": job.q.tolist()} for job in jobs]
+    given.write_text(json.dumps(data), "utf-8")
+    subprocess.run([interpreter, poses.__file__, str(given), str(found)], check=True)
+    return [np.array(one) for one in json.loads(found.read_text("utf-8"))]
 
 
 def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
@@ -117,57 +118,40 @@ def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
     return found
 
 
-def in_octave(form: str, lines_of: Callable[[str, Job], list[str]], first: str = "") -> Run:
-    """Run MATLAB's formats in one process of Octave; `lines_of` returns the lines that print poses."""
-
-    def run(jobs: Sequence[Job], folder: Path) -> Poses:
-        octave, lines = _program("octave-cli"), [first]
-        for k, job in enumerate(jobs):
-            text = export(replace(job.table, robot=f"t{k}"), form)
-            name = re.findall(r"^function .*= (\w+)\(", text, re.MULTILINE)[0]
-            (folder / f"{name}.m").write_text(text, "utf-8")
-            lines += [*lines_of(name, job), "printf('end\\n');"]
-        (folder / "tables.m").write_text("\n".join(lines), "utf-8")
-        command = [octave, "--no-init-file", "--quiet", "tables.m"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
-        if done.stdout.startswith("missing"):
-            raise Missing("Octave's package symbolic")
-        # Octave's package also prints the version of Python that it found.
-        parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in done.stdout.split("end\n")[:-1])
-        return [_read(part) for part in parts]
-
-    return run
-
-
-def _printed(value: str) -> str:
-    return f"printf('%.17g\\n', ({value})');"
-
-
-def _plainly(name: str, job: Job) -> list[str]:
-    numbers = ("; ".join(map(repr, q)) for q in job.given("matlab"))
-    return [f"f = {name}();", *(_printed(f"f.placement([{q}])") for q in numbers)]
+def in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
+    """Run one of MATLAB's formats in one process of Octave."""
+    octave, lines = _program("octave-cli"), [_FIRST.get(form, "")]
+    for k, job in enumerate(jobs):
+        text = export(replace(job.table, robot=f"t{k}"), form)
+        name = re.findall(r"^function .*= (\w+)\(", text, re.MULTILINE)[0]
+        (folder / f"{name}.m").write_text(text, "utf-8")
+        lines.append(f"{'[f, x]' if form == 'matlab-symbolic' else 'f'} = {name}();")
+        for q in job.given(form):
+            numbers, tip = "; ".join(map(repr, q)), f"{plain(job.table.tip_frame)}_tip"
+            exact = "; ".join(f"vpa('{x!r}')" for x in q)
+            value = {
+                "matlab": f"f.placement([{numbers}])",
+                "matlab-symbolic": f"double(subs(f, x, [{exact}]))",
+                "matlab-rst": f"getTransform(f, [{numbers}]', '{tip}')",
+            }[form]
+            lines.append(f"printf('%.17g\\n', ({value})');")
+        lines.append("printf('end\\n');")
+    (folder / "tables.m").write_text("\n".join(lines), "utf-8")
+    command = [octave, "--no-init-file", "--quiet", "tables.m"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    if done.stdout.startswith("missing"):
+        raise Missing("Octave's package symbolic")
+    # Octave's package also prints the version of Python that it found.
+    parts = (re.sub(r".*[a-df-z].*\n", "", part) for part in done.stdout.split("end\n")[:-1])
+    return [np.array(part.split(), dtype=np.float64).reshape(-1, 4, 4) for part in parts]
 
 
-def _symbolically(name: str, job: Job) -> list[str]:
-    exact = ("; ".join(f"vpa('{x!r}')" for x in q) for q in job.q.tolist())
-    return [f"[T, q] = {name}();", *(_printed(f"double(subs(T, q, [{q}]))") for q in exact)]
-
-
-def _as_bodies(name: str, job: Job) -> list[str]:
-    tip = f"{plain(job.table.tip_frame)}_tip"
-    numbers = (", ".join(map(repr, q)) for q in job.q.tolist())
-    return [f"robot = {name}();", *(_printed(f"getTransform(robot, [{q}], '{tip}')") for q in numbers)]
-
-
-def read_back(form: str) -> Run:
-    def run(jobs: Sequence[Job], folder: Path) -> Poses:
-        found, file = Poses(), folder / f"table.{form}"
-        for job in jobs:
-            file.write_text(export(job.table, form), "utf-8")
-            found.append(read_table(file).placement(job.q))
-        return found
-
-    return run
+def read_back(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
+    found, file = Poses(), folder / f"table.{form}"
+    for job in jobs:
+        file.write_text(export(job.table, form), "utf-8")
+        found.append(read_table(file).placement(job.q))
+    return found
 
 
 def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
@@ -183,15 +167,11 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
 
 
 RUN: dict[str, Run] = {
-    **{form: in_python(form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
+    **{form: partial(in_python, form) for form in ("numpy", "sympy", "casadi", "roboticstoolbox", "ets")},
     "c": in_c,
-    "matlab": in_octave("matlab", _plainly),
-    "matlab-symbolic": in_octave("matlab-symbolic", _symbolically, _PACKAGE),
-    # Octave uses substitutes for the toolbox's classes; this format has not been run in MATLAB.
-    "matlab-rst": in_octave(
-        "matlab-rst", _as_bodies, f"addpath('{Path(__file__).parent / 'forms' / 'octave'}');"
-    ),
-    **{form: read_back(form) for form in ("toml", "json", "csv")},
+    # Octave uses substitutes for the toolbox's classes; `matlab-rst` has not been run in MATLAB.
+    **{form: partial(in_octave, form) for form in ("matlab", "matlab-symbolic", "matlab-rst")},
+    **{form: partial(read_back, form) for form in ("toml", "json", "csv")},
     "urdf": as_urdf,
 }
 
@@ -215,10 +195,6 @@ def _program(name: str) -> str:
     if (found := shutil.which(name)) is None:
         raise Missing(name)
     return found
-
-
-def _read(text: str) -> FloatArray:
-    return np.array(text.split(), dtype=np.float64).reshape(-1, 4, 4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,54 +251,44 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--toolbox", metavar="PYTHON", help="Python interpreter that has roboticstoolbox")
     forms = (*RUN, "latex")
     parser.add_argument("--forms", nargs="+", choices=forms, default=forms, metavar="FORM")
-    arguments = parser.parse_args(words)
+    given = parser.parse_args(words)
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-    if arguments.toolbox:
-        RUN.update({form: elsewhere(form, arguments.toolbox) for form in ("roboticstoolbox", "ets")})
-    found = list(subjects(arguments.leaves))
+    if given.toolbox:
+        RUN.update({form: partial(elsewhere, form, given.toolbox) for form in ("roboticstoolbox", "ets")})
+    found = list(subjects(given.leaves))
     heads = ("form", "tables", "refused", "from Pinocchio at most", "of the bound", "seconds")
     print(markdown(heads, [], left=1), flush=True)
     wrong = 0
-    for form in arguments.forms:
+    for form in given.forms:
+        begin = time.perf_counter()
         with tempfile.TemporaryDirectory() as folder:
-            wrong += _checked(form, found, Path(folder))
+            try:
+                cells, faults = (_fitted if form == "latex" else _compared)(form, found, Path(folder))
+            except Missing as error:
+                cells, faults = [f"not run: {error} is missing", "", "", ""], []
+        print(f"| {form} | {' | '.join(cells)} | {time.perf_counter() - begin:.0f} |", flush=True)
+        print(*(f"WRONG {form}: {fault}" for fault in faults), sep="\n", end="\n" * bool(faults), flush=True)
+        wrong += len(faults)
     return int(wrong > 0)
 
 
-def _checked(form: str, found: Sequence[Subject], folder: Path) -> int:
-    begin = time.perf_counter()
-    if form == "latex":
-        return _compiled(found, folder)
+def _compared(form: str, found: Sequence[Subject], folder: Path) -> tuple[list[str], list[str]]:
+    """Return the cells of an export format, and the names of wrong exported tables."""
     taken = [one for one in found if form not in FORMATS or fits(form, one.table)]
     if form == "matlab-symbolic":
         taken = [one for one in taken if 0 < len(one.table.rows) <= SMALL][:FEW]
-    try:
-        poses = RUN[form]([one.job for one in taken], folder)
-    except Missing as error:
-        print(f"| {form} | not run: {error} is missing | | | | |", flush=True)
-        return 0
-    figures = [one.off(pose) for one, pose in zip(taken, poses, strict=True)]
+    figures = [
+        one.off(pose) for one, pose in zip(taken, RUN[form]([one.job for one in taken], folder), strict=True)
+    ]
     wrong = [one.name for one, (_, share) in zip(taken, figures, strict=True) if not share <= 1.0]
     metres, share = map(max, zip(*figures, strict=True))
-    seconds = time.perf_counter() - begin
-    counts = f"{len(taken)} | {len(found) - len(taken)}"
-    print(f"| {form} | {counts} | {metres:.1e} m | {share:.0%} | {seconds:.0f} |", flush=True)
-    for name in wrong:
-        print(f"WRONG {form}: {name}", flush=True)
-    return len(wrong)
+    return [str(len(taken)), str(len(found) - len(taken)), f"{metres:.1e} m", f"{share:.0%}"], wrong
 
 
-def _compiled(found: Sequence[Subject], folder: Path) -> int:
-    try:
-        over = too_wide([export(one.table, "latex") for one in found], folder)
-    except Missing as error:
-        print(f"| latex | not run: {error} is missing | | | | |")
-        return 0
-    print(f"| latex | {len(found)} | 0 | {sum(x > 0.0 for x in over)} wider than the page | | |")
-    for one, points in zip(found, over, strict=True):
-        if points:
-            print(f"TOO WIDE by {points} pt: {one.name}")
-    return sum(x > 0.0 for x in over)
+def _fitted(form: str, found: Sequence[Subject], folder: Path) -> tuple[list[str], list[str]]:
+    over = too_wide([export(one.table, form) for one in found], folder)
+    wide = [f"{one.name} is {x} pt too wide" for one, x in zip(found, over, strict=True) if x]
+    return [str(len(found)), "0", f"{len(wide)} wider than the page", ""], wide
 
 
 if __name__ == "__main__":

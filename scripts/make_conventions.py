@@ -239,11 +239,12 @@ def _motions(asked: MeasuredMotion) -> Iterator[Row]:
         for get in (pin.getFrameAcceleration, pin.getFrameClassicalAcceleration)
     )
     six = asked.mujocos(mujoco.mj_objectAcceleration, 0)
+    theirs = which(six, asked.acceleration_readings(flipped=True))
     yield (
         "acceleration, in world axes",
         f"`acceleration`: {ours}",
         f"`getFrameAcceleration`: {spatial}; `getFrameClassicalAcceleration`: {classical}",
-        f"`mj_objectAcceleration`: {which(six, asked.acceleration_readings(flipped=True))}, [angular; linear]",
+        f"`mj_objectAcceleration`: {theirs}, [angular; linear]",
     )
 
 

@@ -15,7 +15,7 @@ import importlib
 import json
 import runpy
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +28,13 @@ def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float
 
         jax.config.update("jax_enable_x64", True)
     any_library = path.endswith("_array.py")
-    name, namespace = ("array", [_namespace(library)]) if any_library else (library, [])
-    checked = scope["check"](*namespace)
+    name = "array" if any_library else library
+    modules = ["jax.numpy" if library == "jax" else "array_api_compat.torch"] * any_library
+    checked = scope["check"](*map(importlib.import_module, modules))
     for (_, kind), share in checked.items():
         yield f"{name} {kind}", share
     if "hessian" in scope["TRUE"]:
-        yield f"{name} gradient", of_hessian(scope, *(_torch if library == "torch" else _jax)())
+        yield f"{name} gradient", of_hessian(scope, library)
     if any_library:
         return
     for good in scope.get("gradients", dict)().values():
@@ -42,29 +43,18 @@ def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float
         yield "torch.compile", of_compiled(scope)
 
 
-def _namespace(library: str) -> Any:
-    return importlib.import_module("jax.numpy" if library == "jax" else "array_api_compat.torch")
-
-
-def _torch() -> tuple[Callable[..., Any], Callable[..., Any]]:
-    import torch  # noqa: PLC0415
-
-    def tensor(x: Any) -> Any:
-        return torch.tensor(x, dtype=torch.float64)
-
-    return tensor, lambda function: torch.func.vmap(torch.func.jacrev(function))
-
-
-def _jax() -> tuple[Callable[..., Any], Callable[..., Any]]:
-    import jax  # noqa: PLC0415
-
-    return jax.numpy.array, lambda function: jax.vmap(jax.jacrev(function))
-
-
-def of_hessian(scope: dict[str, Any], array: Callable[..., Any], slopes: Callable[..., Any]) -> float:
+def of_hessian(scope: dict[str, Any], library: str) -> float:
     """Return the largest error of the Jacobian's derivatives as a share of the Hessian's bound."""
-    q = array(scope["GIVEN"]["q"])
-    found = slopes(scope["jacobian"])(q).reshape(len(q), -1).tolist()
+    if library == "torch":
+        import torch  # noqa: PLC0415
+
+        q = torch.tensor(scope["GIVEN"]["q"], dtype=torch.float64)
+        slopes = torch.func.vmap(torch.func.jacrev(scope["jacobian"]))
+    else:
+        import jax  # noqa: PLC0415
+
+        q, slopes = jax.numpy.array(scope["GIVEN"]["q"]), jax.vmap(jax.jacrev(scope["jacobian"]))
+    found = slopes(q).reshape(len(q), -1).tolist()
     return worst(found, scope["TRUE"]["hessian"], scope["WITHIN"]["hessian"], 2.0**-52)
 
 
