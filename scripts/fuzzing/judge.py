@@ -10,6 +10,7 @@ from __future__ import annotations
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -46,41 +47,40 @@ class MismatchError(Exception):
 
 def judge(case: Case) -> Outcome:
     try:
-        return _judge_mjcf(case) if is_mjcf(case.data) else _judge(case)
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            return _judge_mjcf(case, warned) if is_mjcf(case.data) else _judge(case, warned)
     except UrdfkinError as error:
         return Outcome(f"raises {type(error).__name__}", traceback.format_exc())
     except Exception as error:
         return Outcome(f"traceback: {type(error).__name__}", traceback.format_exc())
 
 
-def _judge(case: Case) -> Outcome:
-    findings = urdfkin.check(case.data, root_joint=case.root_joint, mimic=case.mimic)
+def _judge(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
+    how: dict[str, Any] = {"root_joint": case.root_joint, "mimic": case.mimic}
+    findings = urdfkin.check(case.data, **how)
     errors = [finding for finding in findings if finding.severity is Severity.ERROR]
-    with warnings.catch_warnings(record=True) as warned:
-        warnings.simplefilter("always")
-        try:
-            robot = urdfkin.load(case.data, root_joint=case.root_joint, mimic=case.mimic)
-        except UrdfError as error:
-            if errors:
-                return Outcome("refused", errors[0].code)
-            return Outcome("load refuses a file that check accepts", str(error))
+    try:
+        robot = urdfkin.load(case.data, **how)
+    except UrdfError as error:
         if errors:
-            return Outcome("load accepts a file that check refuses", str(errors[0]))
-        return _computed(robot, findings, warned)
+            return Outcome("refused", errors[0].code)
+        return Outcome("load refuses a file that check accepts", str(error))
+    if errors:
+        return Outcome("load accepts a file that check refuses", str(errors[0]))
+    return _computed(robot, findings, warned)
 
 
-def _judge_mjcf(case: Case) -> Outcome:
+def _judge_mjcf(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
     model = mjcf.compiled(case.data)
-    with warnings.catch_warnings(record=True) as warned:
-        warnings.simplefilter("always")
-        try:
-            robot = urdfkin.load(case.data, mimic=case.mimic)
-        except InputError as error:
-            known = model is None or error.remedy is not None
-            return Outcome("refused" if known else "load refuses a file that MuJoCo accepts", str(error))
-        if model is not None and (found := mjcf.difference(robot, model, 0)) is not None:
-            return Outcome("MuJoCo reads another robot", found)
-        return _computed(robot, robot.findings, warned)
+    try:
+        robot = urdfkin.load(case.data, mimic=case.mimic)
+    except InputError as error:
+        known = model is None or error.remedy is not None
+        return Outcome("refused" if known else "load refuses a file that MuJoCo accepts", str(error))
+    if model is not None and (found := mjcf.difference(robot, model, 0)) is not None:
+        return Outcome("MuJoCo reads another robot", found)
+    return _computed(robot, robot.findings, warned)
 
 
 def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
@@ -95,22 +95,20 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
         verified = robot.certificate().verified and not doubted
         ask_prepared(robot, seed=0)
-    except urdfkin.VerificationError as error:
-        return Outcome("disagrees with Pinocchio", str(error))
-    except urdfkin.TableError as error:
-        return Outcome("a table disagrees with Pinocchio", str(error))
-    except RangeError as error:
-        return Outcome(too_large, str(error))
-    except MismatchError as error:
-        return Outcome("two computations of one result differ", str(error))
-    return Outcome("verified") if verified else _unverified(robot, findings, warned)
-
-
-def _unverified(robot: Robot, findings: list[Finding], warned: list[warnings.WarningMessage]) -> Outcome:
-    """Return the outcome if some results are not verified: good only if urdfkin reported the reason."""
-    marked = [finding for finding in findings if finding.oracle is not None]
-    if marked:
-        return Outcome("not verified, with a finding that states the reason", marked[0].code)
+    except (urdfkin.VerificationError, urdfkin.TableError, RangeError, MismatchError) as error:
+        words = {
+            urdfkin.VerificationError: "disagrees with Pinocchio",
+            urdfkin.TableError: "a table disagrees with Pinocchio",
+            RangeError: too_large,
+            MismatchError: "two computations of one result differ",
+        }
+        return Outcome(next(word for kind, word in words.items() if isinstance(error, kind)), str(error))
+    if verified:
+        return Outcome("verified")
+    # Results without a check are good only if a finding states the reason.
+    for finding in findings:
+        if finding.oracle is not None:
+            return Outcome("not verified, with a finding that states the reason", finding.code)
     if (reason := robot.verifier.cannot()) is not None:
         return Outcome("Pinocchio refuses a file that check accepts", reason)
     texts = "; ".join(str(w.message) for w in warned)

@@ -13,7 +13,7 @@ import numpy as np
 
 from scripts.fuzzing import Case
 from scripts.fuzzing import odd_numbers as odd
-from urdfkin.model.tree import FloatArray, JointKind, LinkFrame
+from urdfkin.model.tree import JointKind, LinkFrame
 from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
@@ -55,17 +55,13 @@ class _File:
         )
 
     def defaults(self) -> str:
+        """Return nested default classes for joints and sites."""
         if self.family != "mjcf-classes":
             return ""
-
-        def inside() -> str:
-            joint = " ".join(self.joint_words(0.3))
-            site = f'<site pos="{self.vector()}"/>' if self.rng.random() < 0.5 else ""
-            return f"<joint {joint}/>{site}"
-
-        inner = f'<default class="inner">{inside()}</default>'
-        outer = f'<default class="outer">{inside()}{inner}</default>'
-        return f'<default>{outer}<default class="other">{inside()}</default></default>'
+        sites = [f'<site pos="{self.vector()}"/>' * (self.rng.random() < 0.5) for _ in _CLASSES]
+        outer, inner, other = (f"<joint {' '.join(self.joint_words(0.3))}/>{site}" for site in sites)
+        outer = f'<default class="outer">{outer}<default class="inner">{inner}</default></default>'
+        return f'<default>{outer}<default class="other">{other}</default></default>'
 
     def body(self, depth: int) -> str:
         rng = self.rng
@@ -73,32 +69,29 @@ class _File:
         words = [f'name="{name}"', f'pos="{self.vector()}"', self.orientation()]
         if self.family == "mjcf-classes" and rng.random() < 0.4:
             words.append(f'childclass="{rng.choice(_CLASSES)}"')
-        free = depth == 0 and rng.random() < (0.8 if self.family == "mjcf-free" else 0.1)
-        joints = [self.free_joint()] if free else [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
-        parts = ["".join(joints)]
-        parts += [self.shape() for _ in range(rng.randint(1, 2))]
+        kind = "joint" if rng.random() < 0.5 else "freejoint"
+        align = f'align="{rng.choice(("true", "false", "auto"))}"' if kind == "freejoint" else 'type="free"'
+        if depth == 0 and rng.random() < (0.8 if self.family == "mjcf-free" else 0.1):
+            parts = [f'<{kind} name="free{self.bodies}" {align}/>']
+        else:
+            parts = [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
+        for _ in range(rng.randint(1, 2)):  # boxes give their body an inertia with oblique axes
+            sizes = " ".join(repr(rng.uniform(0.05, 0.5)) for _ in range(3))
+            parts.append(f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>')
         if rng.random() < 0.2:
             moments = " ".join(repr(1.0 + rng.random()) for _ in range(3))
             parts.append(f'<inertial pos="{self.vector()}" mass="1" diaginertia="{moments}"/>')
         for _ in range(rng.randint(0, 2)):
-            parts.append(f'<site name="site{self.sites}"{self.of_class()} {self.site_words()}/>')
+            place = f'pos="{self.vector()}" {self.orientation()}' if rng.random() < 0.7 else ""
+            parts.append(f'<site name="site{self.sites}"{self.of_class()} {place}/>')
             self.sites += 1
         while depth < 4 and rng.random() < 0.45:
             parts.append(self.body(depth + 1))
         return f"<body {' '.join(words)}>{''.join(parts)}</body>"
 
-    def site_words(self) -> str:
-        return f'pos="{self.vector()}" {self.orientation()}' if self.rng.random() < 0.7 else ""
-
     def of_class(self) -> str:
         named = self.family == "mjcf-classes" and self.rng.random() < 0.4
         return f' class="{self.rng.choice(_CLASSES)}"' if named else ""
-
-    def free_joint(self) -> str:
-        name, align = f"free{self.bodies}", self.rng.choice(("true", "false", "auto"))
-        if self.rng.random() < 0.5:
-            return f'<joint name="{name}" type="free"/>'
-        return f'<freejoint name="{name}" align="{align}"/>'
 
     def joint(self) -> str:
         name = f"joint{len(self.joints)}"
@@ -117,11 +110,6 @@ class _File:
             f'range="{lower!r} {upper + 0.1!r}" limited="true"',
         )
         return [word for word in words if rng.random() < share]
-
-    def shape(self) -> str:
-        """Return a box, which gives its body an inertia with oblique axes."""
-        sizes = " ".join(repr(self.rng.uniform(0.05, 0.5)) for _ in range(3))
-        return f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>'
 
     def orientation(self) -> str:
         rng = self.rng
@@ -171,7 +159,15 @@ def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     warned = {one.name for one in robot.findings if one.code == "MJCF101" and one.element == "equality"}
     for q in robot.sample(3, seed=seed):
-        data.qpos[:] = _qpos(robot, model, q)
+        data.qpos[:] = model.qpos0
+        for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
+            if joint.kind is JointKind.FIXED:
+                continue
+            to, rule = int(model.joint(joint.name).qposadr[0]), joint.mimic
+            if joint.kind is JointKind.FLOATING:
+                data.qpos[to : to + 7] = [*q[at : at + 3], q[at + 6], *q[at + 3 : at + 6]]
+            else:
+                data.qpos[to] = q[at] if rule is None else rule.multiplier * q[at] + rule.offset
         mujoco.mj_fwdPosition(model, data)
         large = 10.0 + float(np.abs(data.qpos).max(initial=0.0)) + float(np.abs(model.qpos0).max(initial=0.0))
         for kind, count in (("body", model.nbody), ("site", model.nsite)):
@@ -187,17 +183,3 @@ def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
             if name not in warned and abs(data.efc_pos[row]) > 1e3 * _APART * large:
                 return f"{name} is off by {data.efc_pos[row]:.3g}"
     return None
-
-
-def _qpos(robot: Robot, model: mujoco.MjModel, q: FloatArray) -> FloatArray:
-    qpos: FloatArray = np.array(model.qpos0)
-    for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
-        if joint.kind is JointKind.FIXED:
-            continue
-        to = int(model.joint(joint.name).qposadr[0])
-        if joint.kind is JointKind.FLOATING:
-            qpos[to : to + 7] = [*q[at : at + 3], q[at + 6], *q[at + 3 : at + 6]]
-        else:
-            rule = joint.mimic
-            qpos[to] = q[at] if rule is None else rule.multiplier * q[at] + rule.offset
-    return qpos
