@@ -59,9 +59,8 @@ def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
 
 def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
     """Return the poses of all links in the base frame for each configuration; Pinocchio checks each pose."""
-    q = robot.sample(CONFIGURATIONS, seed=0)
     links = list(robot.link_names)
-    T = robot.placement(q, links)
+    T = robot.placement(robot.sample(CONFIGURATIONS, seed=0), links)
     return [dict(zip(links, one, strict=True)) for one in T]
 
 
@@ -148,75 +147,63 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
+    """Return the page with the cells, the stated differences, the features and the reasons."""
     cells, versions = figures["cells"], figures["versions"]
-    notes = _documented(figures)
-    letters = {id(one): chr(ord("a") + i) for i, one in enumerate(notes)}
+    titles = {name: LIBRARIES[name].title for name in cells}
+    notes = {}  # the documented differences of these libraries, by their letters
+    for note in DATA.get("documented", ()):
+        verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
+        if "documented" in verdicts:
+            notes[chr(ord("a") + len(notes))] = note
 
     def words(library: str, feature: str) -> str:
         one = cells[library][feature]
         if "difference" not in one:
             return str(one["verdict"])
-        number = f"{one['difference']:.2g}"
-        for note in notes:
-            if note["library"] == library and feature in note["features"]:
-                return f"{number} *{letters[id(note)]}*"
-        return number
+        letters = (
+            f" *{x}*" for x, n in notes.items() if n["library"] == library and feature in n["features"]
+        )
+        return f"{one['difference']:.2g}{next(letters, '')}"
 
     rows = [(name, *(words(library, name) for library in cells)) for name in FEATURES]
-    verdicts = {name: Counter(one["verdict"] for one in cells[name].values()) for name in cells}
+    counts = {name: Counter(one["verdict"] for one in cells[name].values()) for name in cells}
     rows += [
-        (f"*{title}*", *(str(verdicts[name][verdict]) for name in cells))
-        for verdict, title in VERDICTS.items()
+        (f"*{title}*", *(str(counts[name][verdict]) for name in cells)) for verdict, title in VERDICTS.items()
     ]
     stated = [
-        f"- *{letters[id(n)]}*, {LIBRARIES[n['library']].title}: {n['words']} ([source]({n['source']}))"
-        for n in notes
+        f"- *{letter}*, {titles[n['library']]}: {n['words']} ([source]({n['source']}))"
+        for letter, n in notes.items()
     ]
-    features = [(name, feature.rule) for name, feature in FEATURES.items()]
-    return inserted(
-        text,
-        cells=table(["", *(f"{LIBRARIES[name].title} {versions[name]}" for name in cells)], rows),
-        stated="\n".join(stated),
-        features=table(("Feature", "Rule of the standard"), features),
-        reasons=table(("Library", "Features", "Message, or the joints"), _reasons(cells)),
-    )
-
-
-def _documented(figures: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the notes about a cell that is different as the library's documents state."""
-
-    def applies(note: Mapping[str, Any]) -> bool:
-        column = figures["cells"].get(note["library"], {})
-        return any(column.get(name, {}).get("verdict") == "documented" for name in note["features"])
-
-    return [note for note in DATA.get("documented", ()) if applies(note)]
-
-
-def _reasons(cells: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    reasons: dict[tuple[str, str], list[str]] = {}
     for library, column in cells.items():
-        reasons: dict[str, list[str]] = {}
         for feature, one in column.items():
             if reason := one.get("message") or one.get("note"):
                 clean = reason.replace("|", r"\|").replace("`", "'")
                 quoted = f"`{clean}`" if one["verdict"] == "refused" else clean
-                reasons.setdefault(quoted, []).append(feature)
-        for reason, names in reasons.items():
-            yield LIBRARIES[library].title, "; ".join(names), reason
+                reasons.setdefault((library, quoted), []).append(feature)
+    return inserted(
+        text,
+        cells=table(["", *(f"{titles[name]} {versions[name]}" for name in cells)], rows),
+        stated="\n".join(stated),
+        features=table(
+            ("Feature", "Rule of the standard"), [(name, feature.rule) for name, feature in FEATURES.items()]
+        ),
+        reasons=table(
+            ("Library", "Features", "Message, or the joints"),
+            [(titles[name], "; ".join(features), reason) for (name, reason), features in reasons.items()],
+        ),
+    )
 
 
-def main() -> None:
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     names, folder = list(DATA["versions"]), platformdirs.user_cache_path("urdfkin-libraries")
     parser.add_argument("libraries", nargs="*", choices=[*names, []], help="libraries; by default all")
     parser.add_argument("--environments", type=Path, default=folder, help=f"default: {folder}")
     parser.add_argument("--page", action="store_true", help="write the page from the JSON file")
     given = parser.parse_args()
-    before = json.loads(FIGURES.read_text("utf-8")) if FIGURES.exists() else {}
+    figures = json.loads(FIGURES.read_text("utf-8")) if FIGURES.exists() else {}
     if not given.page:
-        before = measure(given.environments, given.libraries or names, before)
-        FIGURES.write_text(json.dumps(before, indent=1) + "\n", "utf-8")
-    PAGE.write_text(page(PAGE.read_text("utf-8"), before), "utf-8")
-
-
-if __name__ == "__main__":
-    main()
+        figures = measure(given.environments, given.libraries or names, figures)
+        FIGURES.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
+    PAGE.write_text(page(PAGE.read_text("utf-8"), figures), "utf-8")

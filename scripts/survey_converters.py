@@ -25,7 +25,7 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -106,7 +106,7 @@ _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true
 
 
 class RefusalError(Exception):
-    """A converter refuses a robot."""
+    """A converter refuses a robot, or its result is not compared; the message is a cell of the table."""
 
 
 def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
@@ -127,24 +127,15 @@ def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -
     return source, Path(f"{to}{writes}" if writes else done.stdout.strip().splitlines()[-1])
 
 
-def _compared(tool: str, pythons: Mapping[str, str], name: str) -> tuple[str, Sameness]:
-    """Return the number of moving joints, and the comparison of source and result; or raise RefusalError."""
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        robot = urdfkin.load(name)
+def _compared(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sameness:
+    """Return the comparison of a tool's source and result; or raise RefusalError."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = converted(tool, pythons, _without_shapes(robot.urdf, Path(folder)), Path(folder))
         try:
-            files = converted(tool, pythons, _without_shapes(robot.urdf, Path(folder)), Path(folder))
             source = _loaded(files[0]) if TOOLS[tool].reads else robot
-            boxes = 0 if len(pythons) > 1 else MOST
-            return _joints(robot), urdfkin.same(source, _loaded(files[1]), boxes=boxes)
+            return urdfkin.same(source, _loaded(files[1]), boxes=0 if len(pythons) > 1 else MOST)
         except urdfkin.UrdfkinError as error:
-            raise RefusalError(_joints(robot), f"not compared: {error.what}") from None
-        except RefusalError as refusal:
-            raise RefusalError(_joints(robot), *refusal.args) from None
-
-
-def _joints(robot: urdfkin.Robot) -> str:
-    return str(sum(joint.kind.nq > 0 for joint in robot.tree.joints))
+            raise RefusalError(f"not compared: {error.what}") from None
 
 
 def _without_shapes(urdf: str, folder: Path) -> Path:
@@ -159,39 +150,35 @@ def _without_shapes(urdf: str, folder: Path) -> Path:
     return file
 
 
-def row_of(tool: str, pythons: Mapping[str, str], name: str) -> list[str]:
-    """Return name, joints, verdict, and the largest distance and angle between the models as written.
+def row_of(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
+    """Return the verdict, and the largest distance and angle between the models as written.
 
     For USD of a URDF, the second size is the largest distance that single precision can cause.
     """
     try:
-        joints, found = _compared(tool, pythons, name)
+        found = _compared(tool, pythons, robot)
     except RefusalError as refusal:
-        return [name, *refusal.args, "", ""]
+        return str(refusal), "", ""
+    verdict = found.verdict.value
+    if found.verdict is Verdict.SAME_AFTER:
+        verdict = f"equivalent up to {', '.join(found.up_to)}"
+    elif not found:
+        verdict = str(found.unexplained[0]) if found.unexplained else found.differences[0].words
     if tool != "urdf-usd-converter":
-        return [name, joints, _verdict(found), length(found.written[0]), angle(found.written[1])]
+        return verdict, length(found.written[0]), angle(found.written[1])
     off = length(0.0 if found.worst is None else found.worst.upper)
     if found.single is None:
-        return [name, joints, "the stage has no rounded number", off, ""]
-    return [name, joints, _verdict(found), off, length(found.single[0])]
+        return "the stage has no rounded number", off, ""
+    return verdict, off, length(found.single[0])
 
 
-def _verdict(found: Sameness) -> str:
-    if found:
-        after = found.verdict is Verdict.SAME_AFTER
-        return f"equivalent up to {', '.join(found.up_to)}" if after else found.verdict.value
-    return str(found.unexplained[0]) if found.unexplained else found.differences[0].words
-
-
-def wide_row(tools: Mapping[str, str], name: str) -> list[str]:
-    """Return the row of a robot: name, joints, and a cell for each tool; write long verdicts to stderr."""
-    row = [name, ""]
+def wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Iterator[str]:
+    """Yield a cell for each tool; write long verdicts to stderr."""
     for tool in tools:
-        _, row[1], verdict, far, _ = row_of(tool, tools, name)
+        verdict, far, _ = row_of(tool, tools, robot)
         print(f"{name}, {tool}: {verdict} {far}", file=sys.stderr, flush=True)
         short = [word for start, word in _SHORT.items() if verdict.startswith(start)]
-        row.append(" ".join(filter(None, [*short[:1], "" if short or far else "refused", far])))
-    return row
+        yield " ".join(filter(None, [*short[:1], "" if short or far else "refused", far]))
 
 
 def _loaded(file: Path) -> urdfkin.Robot:
@@ -204,19 +191,18 @@ def _loaded(file: Path) -> urdfkin.Robot:
     return urdfkin.load(file, articulation="/")
 
 
-def main() -> None:
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("tools", nargs="+", metavar="TOOL[=PYTHON]", help=f"one of {', '.join(TOOLS)}")
     parser.add_argument("--robots", nargs="+", default=list(catalogue()), help="default: the whole catalogue")
     given = parser.parse_args()
+    warnings.simplefilter("ignore")
     tools = {name: python or sys.executable for name, _, python in (t.partition("=") for t in given.tools)}
     [tool, *more] = tools
     last = "single precision allows" if tool == "urdf-usd-converter" else "angle"
     print(table(["robot", "moving joints", *(tools if more else ("verdict", "at most apart", last))], []))
     for name in given.robots:
-        row = wide_row(tools, name) if more else row_of(tool, tools, name)
-        print(f"| {' | '.join(row)} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()
+        robot = urdfkin.load(name)
+        row = wide_row(tools, name, robot) if more else row_of(tool, tools, robot)
+        joints = sum(joint.kind.nq > 0 for joint in robot.tree.joints)
+        print(f"| {name} | {joints} | {' | '.join(row)} |", flush=True)
