@@ -41,7 +41,7 @@ from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.pages import page as page_of
 from urdfkin.validation.accuracy import AccuracyLine, Judgement, judge
 from urdfkin.validation.document import VALIDATION
-from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
+from urdfkin.verify.exact.enclosure import Enclosures
 from urdfkin.verify.pinocchio import version
 
 
@@ -85,20 +85,12 @@ LIMITS = {
 
 
 def findings() -> dict[str, str]:
+    """Return the limits, the codes, and the warnings of the robots in the catalogue."""
     limits = [
-        (f"{limit:,} {words}", f"`{option}`" if option else "") for option, (limit, words) in LIMITS.items()
+        (f"{limit:,} {words}", f"`{option}`" * bool(option)) for option, (limit, words) in LIMITS.items()
     ]
-    heads = ("robot", "code", "where", "what", "meaning")
-    return {
-        "limits": table(("limit", "option"), limits).replace("|  |", "| |"),
-        "codes": "\n".join(_codes()),
-        "robots": table(heads, _warnings()),
-    }
-
-
-def _codes() -> Iterator[str]:
+    codes = []
     for digit, family in FAMILIES.items():
-        rules = [rule for rule in RULES.values() if rule.id[4] == digit]
         rows = [
             (
                 rule.id,
@@ -107,17 +99,21 @@ def _codes() -> Iterator[str]:
                 _cell(shortened(page_of(rule.id).title, 200)),
                 f"*{rule.oracle.value}*" if rule.oracle else "",
             )
-            for rule in rules
+            for rule in RULES.values()
+            if rule.id[4] == digit
         ]
-        yield f"### {family}\n\n{table(('code', 'name', 'severity', 'finding', 'Pinocchio'), rows)}\n"
-
-
-def _warnings() -> Iterator[tuple[str, ...]]:
-    for name in catalogue():
-        for finding in warnings_of(name):
-            lines = f"line {finding.line}" + (f" and {len(finding.also)} more" if finding.also else "")
-            what = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
-            yield name, finding.code, lines, _cell(shortened(what, 200)), REMARKS[finding.code]
+        heads = ("code", "name", "severity", "finding", "Pinocchio")
+        codes.append(f"### {family}\n\n{table(heads, rows)}\n")
+    found = []
+    for name, finding in ((one, finding) for one in catalogue() for finding in warnings_of(one)):
+        lines = f"line {finding.line}" + (f" and {len(finding.also)} more" if finding.also else "")
+        what = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
+        found.append((name, finding.code, lines, _cell(shortened(what, 200)), REMARKS[finding.code]))
+    return {
+        "limits": table(("limit", "option"), limits).replace("|  |", "| |"),
+        "codes": "\n".join(codes),
+        "robots": table(("robot", "code", "where", "what", "meaning"), found),
+    }
 
 
 def warnings_of(robot: str) -> list[Finding]:
@@ -125,14 +121,19 @@ def warnings_of(robot: str) -> list[Finding]:
 
 
 def reports() -> dict[str, str]:
+    """Return the layout of the JSON report, from its schema."""
     whole = VALIDATION.schema()
     parts = {"The document": whole, **{f"`{name}`": part for name, part in whole["$defs"].items()}}
-    return {"layout": "\n".join(_layout(title, part) for title, part in parts.items())}
-
-
-def _layout(title: str, part: dict[str, Any]) -> str:
-    rows = [(f"`{name}`", _type(entry), _cell(_meaning(entry))) for name, entry in part["properties"].items()]
-    return f"### {title}\n\n{part['description']}\n\n{table(('entry', 'type', 'meaning'), rows)}\n"
+    layout = []
+    for title, part in parts.items():
+        rows = []
+        for name, entry in part["properties"].items():
+            # An entry without a description has that of its type.
+            kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
+            rows.append((f"`{name}`", _type(entry), _cell(entry.get("description") or kind["description"])))
+        heads = ("entry", "type", "meaning")
+        layout.append(f"### {title}\n\n{part['description']}\n\n{table(heads, rows)}\n")
+    return {"layout": "\n".join(layout)}
 
 
 def _type(entry: dict[str, Any]) -> str:
@@ -149,12 +150,6 @@ def _type(entry: dict[str, Any]) -> str:
         count = entry.get("minItems")
         return f"{f'{count} ×' if count else 'list of'} {_type(entry['items'])}"
     return str(entry["type"])
-
-
-def _meaning(entry: dict[str, Any]) -> str:
-    """Return the description of an entry or, if it has none, the description of the entry's type."""
-    name = entry.get("$ref", "").rpartition("/")[2]
-    return str(entry.get("description") or VALIDATION.schema()["$defs"][name]["description"])
 
 
 STUDIED = {
@@ -232,48 +227,45 @@ def _of_robots() -> Iterator[tuple[object, ...]]:
     for name in PROVEN:
         robot = urdfkin.load(name)
         depth = len(robot.tree.path(robot.tree.frame_link(robot.tip_frame)))
-        _proof(robot, 0, None)
         for digits in (15, None):
-            begin = time.process_time()
-            proofs = [_proof(robot, seed, digits) for seed in range(ENCLOSED)]
-            ms = 1e3 * (time.process_time() - begin) / ENCLOSED
-            parts = [part for proof in proofs for part in _parts(proof)]
-            steps = max(float((part.width / np.spacing(_largest(part))).max()) for part in parts)
-            inside = [_inside(parts, side) for side in ("urdfkin", "pinocchio")]
-            yield name, depth, proofs[0].digits, f"{steps:.3g}", *inside, f"{ms:.1f}"
+            proofs, ms = _proofs(robot, ENCLOSED, digits)
+            parts = [
+                part
+                for p in proofs
+                for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
+            ]
+            # A step is the distance of two doubles at the largest absolute value of all ends.
+            ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
+            steps = max(
+                float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
+            )
+            # Numbers with an interval of width 0 do not count.
+            inside = [
+                np.concatenate([p.contains(getattr(p, side))[p.width > 0.0] for p in parts]).mean()
+                for side in ("urdfkin", "pinocchio")
+            ]
+            yield name, depth, proofs[0].digits, f"{steps:.3g}", *(f"{x:.0%}" for x in inside), f"{ms:.1f}"
 
 
 def _of_chains() -> Iterator[tuple[object, ...]]:
     for length in LENGTHS:
         robot = urdfkin.load(askew(length), verify=False)
-        _proof(robot, 0, None)
         for digits in (15, 50, None):
-            begin = time.process_time()
-            proof = _proof(robot, 0, digits)
-            ms = 1e3 * (time.process_time() - begin)
+            (proof,), ms = _proofs(robot, 1, digits)
             size = float(np.abs(proof.acceleration.urdfkin).max())
             widest = float(proof.acceleration.width.max())
             yield length, proof.digits, f"{size:.1e}", f"{widest:.1e}", f"{ms:.1f}"
 
 
-def _proof(robot: Robot, seed: int, digits: int | None) -> Enclosures:
-    v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))
-    return robot.enclose(robot.sample(1, seed)[0], v, a, robot.tip_frame, digits=digits)
-
-
-def _parts(proof: Enclosures) -> tuple[Enclosure, ...]:
-    return proof.placement, proof.velocity, proof.acceleration, proof.jacobian, proof.jacobian_rate
-
-
-def _largest(part: Enclosure) -> float:
-    """Return the largest absolute value of the ends of all intervals."""
-    return float(np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300))
-
-
-def _inside(parts: list[Enclosure], side: str) -> str:
-    """Return the share of a library's numbers in their proven intervals, without intervals of width 0."""
-    found = [part.contains(getattr(part, side))[part.width > 0.0] for part in parts]
-    return f"{np.concatenate(found).mean():.0%}"
+def _proofs(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
+    """Return the enclosures of random motions, and the processor time of one in ms."""
+    found, times = [], []
+    for seed in (0, *range(count)):  # the first one is not timed
+        v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))
+        q, begin = robot.sample(1, seed)[0], time.process_time()
+        found.append(robot.enclose(q, v, a, robot.tip_frame, digits=digits))
+        times.append(time.process_time() - begin)
+    return found[1:], 1e3 * sum(times[1:]) / count
 
 
 def askew(length: int) -> str:
