@@ -13,8 +13,6 @@ the Nu HTML checker, which needs Java, are optional. Debian's poppler-utils draw
     python -m scripts.audit_pages --only one same --output /tmp/audit
 """
 
-from __future__ import annotations
-
 import argparse
 import base64
 import json

@@ -11,8 +11,6 @@ not installed are listed and left out.
 use of each quantity.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

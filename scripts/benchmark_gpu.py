@@ -14,8 +14,6 @@ nvcc of the package registry is enough: `make nvcc` installs it into the checkou
 Exit 1: a number is outside its bound. 2: no GPU, no nvcc, or the program does not compile.
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 import ctypes

@@ -10,8 +10,6 @@ PYTHON` takes an existing environment instead, without network. SHA256SUMS has o
 a check fails.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import os

@@ -8,13 +8,10 @@ the branch. If there is no earlier commit to compare with, for example on main o
 script reports this and passes.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import subprocess
 import sys
-from collections.abc import Collection
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -24,15 +21,6 @@ _ARGUED = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
 
 class CannotTellError(Exception):
     """Error if the branch cannot be compared; the message states the reason."""
-
-
-def complaint(changed: Collection[str], messages: str) -> str | None:
-    """Return a message if a branch lacks a line in CHANGELOG.md; None if these changes need none."""
-    package = sorted(path for path in changed if path.startswith("urdfkin/"))
-    if not package or PAGE in changed or _ARGUED.search(messages):
-        return None
-    more = f" and {len(package) - 1} more" if len(package) > 1 else ""
-    return f"{package[0]}{more} changed without a line in {PAGE}"
 
 
 def git(root: Path, *words: str) -> str:
@@ -59,27 +47,27 @@ def left_main(root: Path) -> str:
     raise CannotTellError("HEAD is on main, or main is not in this clone")
 
 
-def changed_files(root: Path, base: str) -> set[str]:
-    """Return the files that changed since `base`; a moved file counts only if its text changed."""
-    entries = git(root, "diff", "--numstat", "-z", "-M", base, "HEAD")
-    # Format: added TAB deleted TAB path NUL; for a moved file: added TAB deleted TAB NUL old NUL new NUL.
-    found = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
-    return {path for added, deleted, path in found if (added, deleted) != ("0", "0")}
-
-
 def main(root: Path = ROOT, base: str | None = None) -> int:
+    """Check the branch; return 1 if a line is missing, else 0."""
     try:
         base = base or left_main(root)
-        problem = complaint(changed_files(root, base), git(root, "log", "--format=%B", f"{base}..HEAD"))
+        entries = git(root, "diff", "--numstat", "-z", "-M", base, "HEAD")
+        messages = git(root, "log", "--format=%B", f"{base}..HEAD")
     except CannotTellError as error:
         print(f"changelog not checked: {error}")
         return 0
-    if problem:
-        print(
-            f"{problem}: add a line under the unreleased version, or write `No-changelog: REASON` into a"
-            " commit message"
-        )
-    return 1 if problem else 0
+    # Format: added TAB deleted TAB path NUL; for a moved file: added TAB deleted TAB NUL old NUL new NUL.
+    found = re.findall(r"(\S+)\t(\S+)\t(?:\0[^\0]*\0)?([^\0]+)\0", entries)
+    changed = {path for added, deleted, path in found if (added, deleted) != ("0", "0")}
+    package = sorted(path for path in changed if path.startswith("urdfkin/"))
+    if not package or PAGE in changed or _ARGUED.search(messages):
+        return 0
+    more = f" and {len(package) - 1} more" if len(package) > 1 else ""
+    print(
+        f"{package[0]}{more} changed without a line in {PAGE}: add a line under the unreleased version, or"
+        " write `No-changelog: REASON` into a commit message"
+    )
+    return 1
 
 
 if __name__ == "__main__":

@@ -15,8 +15,6 @@ not within the stored interval. With `--within SHARE`, a result may differ from 
 times its error bound.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import sys
@@ -25,7 +23,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -67,7 +65,7 @@ class Subject:
     frames: tuple[str, ...]
 
     @classmethod
-    def of(cls, name: str, stored: Arrays | None = None) -> Subject:
+    def of(cls, name: str, stored: Arrays | None = None) -> Self:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # hide warnings about the robot's file
             robot = urdfkin.load(name, mimic=catalogue()[name].mimic, verify=False)

@@ -19,8 +19,6 @@ that a stopped run has checked a sample. Exit 1: a number is outside the derived
 warning.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

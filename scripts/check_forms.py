@@ -9,8 +9,6 @@ LaTeX tables are compiled and must fit on the page of an article. A format witho
 is not run. Exit 1: results of a format differ by more than rounding, or a LaTeX table is too wide.
 """
 
-from __future__ import annotations
-
 import argparse
 import ctypes
 import importlib.util

@@ -11,16 +11,13 @@ in which the content repeats. A faulty exporter or an attacker could write such 
 time and memory of the rejection must be proportional to the size of the file.
 """
 
-from __future__ import annotations
-
 import argparse
-import json
+import contextlib
 import resource
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
@@ -165,66 +162,40 @@ KINDS: dict[str, Kind] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Cost:
-    megabytes: float  # size of the document
-    seconds: float  # processor time
-    memory: float  # largest growth of the process's memory in megabytes, including the memory of the findings
-    findings: int  # number of reported findings
+def cost(kind: str, size: int) -> str:
+    """Return the processor time and the growth of memory, findings included, for each MB of a document."""
 
+    def usage() -> tuple[float, float]:
+        return time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
-def cost_of(kind: str, size: int) -> Cost:
     document = KINDS[kind](size)
-    before, start = _peak(), time.process_time()
+    before = usage()
     findings = check_text(document, fold=False)
-    seconds = time.process_time() - start
-    return Cost(len(document) / 1e6, seconds, _peak() - before, len(findings))
+    seconds, memory = (1e6 * (x - y) / len(document) for x, y in zip(usage(), before, strict=True))
+    del findings
+    return f"{seconds:.2f} s, {memory:.0f} MB"
 
 
-def cost_apart(kind: str, size: int, patience: float) -> Cost | None:
-    """Check a document in a separate process; return None after `patience` seconds."""
-    command = [sys.executable, str(Path(__file__)), "--one", str(size), kind]
-    try:
-        done = subprocess.run(command, capture_output=True, check=True, timeout=patience)
-    except subprocess.TimeoutExpired:
-        return None
-    return Cost(**json.loads(done.stdout))
-
-
-def _peak() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
-
-
-def main() -> None:
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     option = parser.add_argument
     option("words", nargs="*", help="parts of the names of the kinds to measure (default: all)")
     option("--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas")
     option("--patience", type=float, default=600.0, help="time limit of one document in seconds")
     option("--one", type=int, help="check one document of this many bytes in this process")
-    options = parser.parse_args()
-    if options.one is not None:
-        print(json.dumps(asdict(cost_of(options.words[0], options.one))))
-        return
-    sizes = [float(size) for size in options.sizes.split(",")]
+    given = parser.parse_args()
+    if given.one is not None:
+        print(cost(given.words[0], given.one))
+        sys.exit()
+    sizes = [float(size) for size in given.sizes.split(",")]
     heads = ["seconds and megabytes for each megabyte of", *(f"{size:g} MB" for size in sizes)]
     print(table(heads, [], left=1))
-    for kind in KINDS:
-        if not options.words or any(word in kind for word in options.words):
-            cells = " | ".join(_row(kind, sizes, options.patience))
-            print(f"| {kind} | {cells} |", flush=True)
-
-
-def _row(kind: str, sizes: list[float], patience: float) -> list[str]:
-    cells: list[str] = []
-    for size in sizes:
-        cost = None if cells and cells[-1] == "..." else cost_apart(kind, int(size * 1e6), patience)
-        if cost is None:
-            cells.append("...")
-        else:
-            cells.append(f"{cost.seconds / cost.megabytes:.2f} s, {cost.memory / cost.megabytes:.0f} MB")
-    return cells
-
-
-if __name__ == "__main__":
-    main()
+    for kind in (kind for kind in KINDS if not given.words or any(word in kind for word in given.words)):
+        cells: list[str] = []
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            for size in sizes:
+                command = [sys.executable, __file__, "--one", str(int(size * 1e6)), kind]
+                done = subprocess.run(command, capture_output=True, check=True, timeout=given.patience)
+                cells.append(done.stdout.decode().strip())
+        cells += ["..."] * (len(sizes) - len(cells))
+        print(f"| {kind} | {' | '.join(cells)} |", flush=True)

@@ -11,8 +11,6 @@ from the decimals in the texts of the two robots, and must lie in the interval o
 is outside its interval, or a verdict is wrong.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -32,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 import urdfkin
 from tests.comparison.pairs import ALIKE, UNLIKE, changed, robot
 from tests.comparison.searching import far, searched
-from urdfkin.comparison.result import Interval, Sameness, Verdict
+from urdfkin.comparison.result import Sameness, Verdict
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
@@ -52,35 +50,21 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     if what in ALIKE:
         return said | {"right": bool(found) and _places_agree(found, a, b)}
     # Rounding to four digits may leave a file unchanged, so the verdict of this change is not checked.
-    right = found.verdict is Verdict.DIFFERS or what == "rounded"
-    if (worst := _farthest(found)) is None:
-        return said | {"right": right}
-    return said | _enclosed(found, a, b, worst) | {"right": right}
-
-
-def _farthest(found: Sameness) -> Interval | None:
-    """Return the finite interval of the largest distance between frames that did not move on their bodies."""
+    said["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
+    # The frame with the largest distance, without frames that moved on their bodies
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
-    stands = np.array_equal(found.base, np.eye(4))
-    return worst if worst is not None and math.isfinite(worst.upper) and stands else None
+    if worst is None or not math.isfinite(worst.upper) or not np.array_equal(found.base, np.eye(4)):
+        return said
+    attained = far(a, b, np.array(worst.q_a), np.array(worst.q_b), worst)
+    truth = max(attained, searched(a, b, found.to_b, worst))
+    said |= {"frame": worst.frame, "lower": worst.lower, "upper": worst.upper, "truth": truth}
+    return said | {"holds": worst.lower <= attained and truth <= worst.upper}
 
 
 def _tools(found: Sameness) -> set[str]:
     """Return the frames of B that `same` reports as moved on their bodies."""
     return {line.split()[1] for line in found.after if line.startswith("frame ")}
-
-
-def _enclosed(found: Sameness, a: Robot, b: Robot, worst: Interval) -> dict[str, Any]:
-    attained = far(a, b, np.array(worst.q_a), np.array(worst.q_b), worst)
-    truth = max(attained, searched(a, b, found.to_b, worst))
-    return {
-        "frame": worst.frame,
-        "lower": worst.lower,
-        "upper": worst.upper,
-        "truth": truth,
-        "holds": worst.lower <= attained and truth <= worst.upper,
-    }
 
 
 def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
@@ -113,7 +97,7 @@ def summary(some: list[dict[str, Any]]) -> Iterator[str]:
     yield from (f"WRONG: {json.dumps(one)}" for one in (*wrong, *missed))
 
 
-def main() -> int:
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("robots", nargs="*", help="names of robots in the catalogue (default: all robots)")
     parser.add_argument("--keep", type=Path, required=True, help="file for the results, one per line")
@@ -123,14 +107,9 @@ def main() -> int:
     some = [json.loads(line) for line in lines]
     there = {(one["robot"], one["change"]) for one in some}
     for name, what in product(options.robots or sorted(catalogue()), (*ALIKE, *UNLIKE)):
-        if (name, what) in there or (one := pair(name, what)) is None:
-            continue
-        some.append(one)
-        with options.keep.open("a") as file:
-            print(json.dumps(one), file=file)
+        if (name, what) not in there and (one := pair(name, what)) is not None:
+            some.append(one)
+            with options.keep.open("a") as file:
+                print(json.dumps(one), file=file)
     print(*summary([one for one in some if not options.robots or one["robot"] in options.robots]), sep="\n")
-    return int(any(not one["right"] or not one.get("holds", True) for one in some))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(any(not one["right"] or not one.get("holds", True) for one in some))

@@ -8,10 +8,9 @@ imported does not count.
     python scripts/count_files.py A.urdf B.urdf load of A, and same of A and B
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
@@ -47,26 +46,21 @@ def files_run(call: Callable[[], object]) -> list[str]:
 
 
 def files_of_load(source: Path) -> list[str]:
-    load = urdfkin.load
-    return files_run(lambda: load(source))
+    return files_run(partial(urdfkin.load, source))
 
 
 def files_of_same(first: Path, second: Path) -> list[str]:
     """Return the files whose functions run during `same`; a first call only compiles kernels."""
-    same = urdfkin.same
+    same = partial(urdfkin.same, first, second)
     with only("compiled"):
-        same(first, second)
-        return files_run(lambda: same(first, second))
-
-
-def main(words: list[str]) -> None:
-    first, second = (*map(Path, words), *(() if words else (A, B)), None)[:2]
-    counts = {"load": files_of_load(first)}
-    if second is not None:
-        counts["same"] = files_of_same(first, second)
-    for name, files in counts.items():
-        print(f"{name}: {len(files)} files", *(f"  {file}" for file in files), sep="\n")
+        same()
+        return files_run(same)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sources = [*map(Path, sys.argv[1:])] or [A, B]
+    counts = {"load": files_of_load(sources[0])}
+    if len(sources) > 1:
+        counts["same"] = files_of_same(*sources)
+    for name, files in counts.items():
+        print(f"{name}: {len(files)} files", *(f"  {file}" for file in files), sep="\n")

@@ -4,8 +4,6 @@
 heading `Example:` is removed, because the site would draw a box around such a section.
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 import textwrap

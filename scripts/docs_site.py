@@ -4,8 +4,6 @@ The pages of commands and of the library are generated from the program, so they
 between $` and `$ becomes MathML. A lesson is also available as a notebook.
 """
 
-from __future__ import annotations
-
 import html
 import importlib
 import inspect

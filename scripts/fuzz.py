@@ -18,8 +18,6 @@ restarted after a crash or a timeout. File i of a family depends only on the see
 failure. Exit 0: no failures.
 """
 
-from __future__ import annotations
-
 import argparse
 import collections
 import multiprocessing

@@ -3,8 +3,6 @@
 python -m scripts.leaks 10000
 """
 
-from __future__ import annotations
-
 import argparse
 import gc
 import json
@@ -65,11 +63,7 @@ def measure(n: int) -> list[dict[str, float]]:
     return found
 
 
-def main() -> None:
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robots", type=int, nargs="?", default=10_000)
     print(json.dumps(measure(parser.parse_args().robots)))
-
-
-if __name__ == "__main__":
-    main()

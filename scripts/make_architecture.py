@@ -5,8 +5,6 @@ with the functions of this script. Every import counts: imports for types, impor
 modules that are named in a string for a lazy import.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

@@ -11,8 +11,6 @@ writes the results to the same file.
     python scripts/make_conventions.py --measure
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import tempfile
@@ -239,12 +237,12 @@ def _motions(asked: MeasuredMotion) -> Iterator[Row]:
         for get in (pin.getFrameAcceleration, pin.getFrameClassicalAcceleration)
     )
     six = asked.mujocos(mujoco.mj_objectAcceleration, 0)
-    theirs = which(six, asked.acceleration_readings(flipped=True))
+    of_mujoco = which(six, asked.acceleration_readings(flipped=True))
     yield (
         "acceleration, in world axes",
         f"`acceleration`: {ours}",
         f"`getFrameAcceleration`: {spatial}; `getFrameClassicalAcceleration`: {classical}",
-        f"`mj_objectAcceleration`: {theirs}, [angular; linear]",
+        f"`mj_objectAcceleration`: {of_mujoco}, [angular; linear]",
     )
 
 

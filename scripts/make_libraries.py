@@ -9,8 +9,6 @@ docs/libraries.toml). urdfkin/verify/adapters.py calls the library. The expected
 Pinocchio checks; tests/test_libraries.py compares them with a reader that was written from the URDF standard.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess
@@ -150,7 +148,7 @@ def page(text: str, figures: Mapping[str, Any]) -> str:
     """Return the page with the cells, the stated differences, the features and the reasons."""
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
-    notes = {}  # the documented differences of these libraries, by their letters
+    notes: dict[str, Any] = {}  # the documented differences of these libraries, by their letters
     for note in DATA.get("documented", ()):
         verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
         if "documented" in verdicts:

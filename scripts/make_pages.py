@@ -9,8 +9,6 @@ of their numbers. The figures of docs/performance.md and its picture are those o
 `python scripts/benchmark.py --json docs/performance.json` writes.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -3,8 +3,6 @@
 The script needs the extras `plots`, `view` and `test`, and Debian's chromium and chromium-driver.
 """
 
-from __future__ import annotations
-
 import io
 import tempfile
 import time
@@ -117,7 +115,7 @@ def keep(browser: Browser, name: str) -> None:
     image.quantize(128).save(IMAGES / f"{name}.png", optimize=True)
 
 
-def main() -> None:
+if __name__ == "__main__":
     with mpl.rc_context(STYLE):
         figure = reference_frames()
         figure.savefig(IMAGES / "reference-frames.svg", metadata={"Date": None})
@@ -125,7 +123,3 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         photograph_report(Path(folder))
         photograph_viewer(Path(folder))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,5 @@
 """Draw the pictures of docs/tour.md into docs/images. This needs matplotlib (the extra `plots`)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

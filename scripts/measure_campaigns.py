@@ -8,8 +8,6 @@ The variants alternate, so that other load of the machine affects all of them. T
 over rounds. Processor time includes all processes, and hardly depends on other load.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import tempfile

@@ -6,8 +6,6 @@ over several runs, each with a new browser profile. The script needs Debian's ch
     python scripts/measure_page.py --robots 2000
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

@@ -7,8 +7,6 @@ The environment that scripts/try.sh makes is enough to print. To write the page,
 example by scripts/test.sh. Python, pip and bytecode are not counted.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import importlib.metadata

@@ -9,8 +9,6 @@ processes equally, so it hardly changes the ratio. The bytecode of all modules a
 installation. A fresh cache is an empty folder for compiled kernels.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

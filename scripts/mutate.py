@@ -12,8 +12,6 @@ mutant replaces a text of a file, and one given test must now fail. Exit 0: all 
 harmless. 1: some mutants are not detected, or there is no mutant. 2: a part does not exist.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import json

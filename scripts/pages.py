@@ -1,7 +1,5 @@
 """Write generated parts into a page, each between the comments `<!-- NAME -->` and `<!-- end -->`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path

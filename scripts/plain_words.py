@@ -7,8 +7,6 @@ The script reads the text of pages, docstrings, comments and messages. CONTRIBUT
 style.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import io
@@ -44,64 +42,60 @@ PLAIN = {
 }
 LONGEST = 30
 _SUFFIXES = (".py", ".md", ".toml")
-_SKIPPED = {".venv", ".git", "site", "node_modules", "build", "dist", "data"}
-_FILES_SKIPPED = {"CHANGELOG.md", "plain_words.py"}
+_SKIPPED = {
+    *(".venv", ".git", "site", "node_modules", "build", "dist", "data"),
+    *("CHANGELOG.md", "plain_words.py"),
+}
 
 
 class Passage(NamedTuple):
+    """A text for people: a line of a page, a docstring, a comment or a message."""
+
     file: str  # the file, relative to the repository
     line: int  # first line of the passage
-    text: str  # words of the passage
+    text: str
 
 
-def passages(path: Path) -> Iterator[Passage]:
-    """Yield the texts of a file: a page's lines, or a module's docstrings, comments and strings."""
-    name, text = str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")
-    if path.suffix != ".py":
-        fenced = False
-        for number, line in enumerate(text.splitlines(), 1):
-            if line.startswith("```"):
-                fenced = not fenced
-            elif not fenced:
-                yield Passage(name, number, re.sub(r"`[^`]*`", "", line))
-        return
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip():
-            yield Passage(name, node.lineno, re.sub(r"`[^`]*`", "", node.value))
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type == tokenize.COMMENT:
-            yield Passage(name, token.start[0], token.string.lstrip("#: "))
-
-
-def files(paths: list[Path]) -> Iterator[Path]:
-    for path in paths:
-        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
-            parts = file.relative_to(ROOT).parts
-            if file.suffix in _SUFFIXES and not _SKIPPED & set(parts) and file.name not in _FILES_SKIPPED:
-                yield file
+def passages(paths: list[Path]) -> Iterator[Passage]:
+    """Yield the texts of files and folders: lines of pages; docstrings, comments and strings of modules."""
+    for file in (file for path in paths for file in (sorted(path.rglob("*")) if path.is_dir() else [path])):
+        name = file.relative_to(ROOT)
+        if file.suffix not in _SUFFIXES or _SKIPPED & set(name.parts):
+            continue
+        text, fenced = file.read_text(encoding="utf-8"), False
+        if file.suffix != ".py":
+            for number, line in enumerate(text.splitlines(), 1):
+                if line.startswith("```"):
+                    fenced = not fenced
+                elif not fenced:
+                    yield Passage(str(name), number, re.sub(r"`[^`]*`", "", line))
+            continue
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip():
+                yield Passage(str(name), node.lineno, re.sub(r"`[^`]*`", "", node.value))
+        for token in tokenize.generate_tokens(io.StringIO(text).readline):
+            if token.type == tokenize.COMMENT:
+                yield Passage(str(name), token.start[0], token.string.lstrip("#: "))
 
 
 def complaints(paths: list[Path]) -> list[str]:
     """Return a line for each word of the list, with its place and its plain form."""
     found = []
-    for file in files(paths):
-        for passage in passages(file):
-            for pattern, plain in PLAIN.items():
-                for match in re.finditer(pattern, passage.text, re.IGNORECASE):
-                    line = passage.line + passage.text[: match.start()].count("\n")
-                    found.append(f"{passage.file}:{line}: {match[0]!r}; write: {plain}")
+    for passage in passages(paths):
+        for pattern, plain in PLAIN.items():
+            for match in re.finditer(pattern, passage.text, re.IGNORECASE):
+                line = passage.line + passage.text[: match.start()].count("\n")
+                found.append(f"{passage.file}:{line}: {match[0]!r}; write: {plain}")
     return found
 
 
 def long_sentences(paths: list[Path]) -> list[str]:
     found = []
-    for file in files(paths):
-        for passage in passages(file):
-            for sentence in re.split(r"(?<=[.!?:;])\s+|\n\s*\n", passage.text):
-                if (words := len(sentence.split())) > LONGEST and "|" not in sentence:
-                    found.append(
-                        f"{passage.file}:{passage.line}: {words} words: {' '.join(sentence.split())[:80]}"
-                    )
+    for passage in passages(paths):
+        for sentence in re.split(r"(?<=[.!?:;])\s+|\n\s*\n", passage.text):
+            words = sentence.split()
+            if len(words) > LONGEST and "|" not in sentence:
+                found.append(f"{passage.file}:{passage.line}: {len(words)} words: {' '.join(words)[:80]}")
     return found
 
 

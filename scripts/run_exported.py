@@ -9,8 +9,6 @@ the Hessian's bound, if the file has a Hessian. For the first file of PyTorch co
 the functions with `torch.compile`. `scripts/check_exports.py --library` calls this script.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import runpy

@@ -18,8 +18,6 @@ Shapes are removed first: a converter would look for meshes. MuJoCo refuses a mo
 is told to give such a body a small one, and to correct impossible inertias.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

@@ -4,8 +4,6 @@ pip install --no-deps --target models gymnasium==1.4.0 dm-control==1.0.50
 python scripts/survey_mjcf.py models
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import warnings
@@ -37,7 +35,7 @@ def said_of(path: Path) -> str:
     return f"verified{whole}; {said}"
 
 
-def main() -> None:
+if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path)
     folder: Path = parser.parse_args().folder
@@ -46,7 +44,3 @@ def main() -> None:
     for said, count in counts.most_common():
         print(f"{count:5d}  {said}")
     print(f"{sum(counts.values()):5d}  files")
-
-
-if __name__ == "__main__":
-    main()

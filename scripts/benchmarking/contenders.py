@@ -1,7 +1,5 @@
 """The contenders: urdfkin, Pinocchio, code generated for one robot, and other installed libraries."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import shutil

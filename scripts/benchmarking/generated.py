@@ -9,8 +9,6 @@ an angle of a million turns gives a wrong result. The generated code also lacks 
 last digit of sine and cosine.
 """
 
-from __future__ import annotations
-
 import ctypes
 import re
 import subprocess

@@ -4,8 +4,6 @@ This module runs itself in a new process, in which no kernel is compiled and no 
 each process, Linux reports the largest memory size since the last reset of this number.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

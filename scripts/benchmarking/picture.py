@@ -4,8 +4,6 @@ The picture shows the time of each contender for one configuration, and the grow
 number of joints and with the size of a batch.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ Each generator compares the results of all contenders before it measures times, 
 if results differ.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

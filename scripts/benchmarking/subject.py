@@ -1,11 +1,10 @@
 """A subject of the benchmark: one robot, one frame, and the configurations that all contenders compute."""
 
-from __future__ import annotations
-
 import contextlib
 import tempfile
 from functools import cached_property
 from pathlib import Path
+from typing import Self
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -40,7 +39,7 @@ class Subject:
         self.v, self.a = np.random.default_rng(0).standard_normal((2, n, self.robot.nv))
         self.stack = contextlib.ExitStack()
 
-    def __enter__(self) -> Subject:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *exception: object) -> None:

@@ -1,7 +1,5 @@
 """Format the measurements as tables, for the terminal and for the page."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

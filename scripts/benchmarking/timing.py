@@ -6,8 +6,6 @@ each round. Before a contender is timed, it computes once without timing. The da
 in the cache, and the threads of the previous contender sleep.
 """
 
-from __future__ import annotations
-
 import gc
 import random
 import time

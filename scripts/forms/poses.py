@@ -8,8 +8,6 @@ for each entry of JOBS.
 The script does not import urdfkin, because the Robotics Toolbox may have its own environment.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -5,8 +5,6 @@ call with Pinocchio. The results of different calls must have the same bits, bec
 forward recursion. Every name of a frame must be accepted.
 """
 
-from __future__ import annotations
-
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence

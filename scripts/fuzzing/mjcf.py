@@ -4,8 +4,6 @@ A file depends only on the seed, its family and its number. MuJoCo computes the 
 and checks the equalities, independently of urdfkin's MJCF reader.
 """
 
-from __future__ import annotations
-
 import random
 
 import mujoco

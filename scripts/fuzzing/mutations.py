@@ -4,8 +4,6 @@ There are four families: bytes, tokens, attributes, and structure (new parents, 
 changed types and mimic rules).
 """
 
-from __future__ import annotations
-
 import contextlib
 import random
 import re

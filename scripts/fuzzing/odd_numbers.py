@@ -1,7 +1,5 @@
 """Draw random unusual numbers for a hostile URDF; most of these numbers are legal."""
 
-from __future__ import annotations
-
 import math
 import random
 

@@ -4,8 +4,6 @@ Most of these robots are legal: a rejected robot would not test the computations
 seed, its family and its number.
 """
 
-from __future__ import annotations
-
 import random
 from collections.abc import Collection
 from xml.sax.saxutils import quoteattr

@@ -5,8 +5,6 @@ another sign, an omitted call, an error that is not raised. Texts, types and com
 mutated.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from contextlib import contextmanager
