@@ -3,16 +3,14 @@
     python scripts/check_bits.py [ROBOT ...]           # compare single, prepared, batched, joint, interpreted
     python scripts/check_bits.py --write before.npz    # also store the results
     python scripts/check_bits.py --against before.npz  # also compare with stored results
-    python scripts/check_bits.py --enclosures --write before.npz    # store enclosures, or compare them
 
 The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
 multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine. If
 results differ from the stored results, the script prints the largest difference as a fraction of the stored
-bound. An interval with the true value must lie in the stored interval.
+bound.
 
-Exit 1: results of this run have different bits, a result differs from the stored result, or an interval is
-not within the stored interval. With `--within SHARE`, a result may differ from the stored result by SHARE
-times its error bound.
+Exit 1: results of this run have different bits, or a result differs from the stored result. With `--within
+SHARE`, a result may differ from the stored result by SHARE times its error bound.
 """
 
 import argparse
@@ -32,8 +30,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout 
 import urdfkin
 from urdfkin.compiled.preload import Way, only
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
@@ -74,7 +70,8 @@ class Subject:
             return cls(name, robot, inputs, tuple(stored[f"{name}/frames"].tolist()))
         n = max(LENGTHS)
         v, a = np.random.default_rng(0).standard_normal((2, n, robot.nv))
-        links = [f"link:{robot.link_names[i]}" for i in spread(len(robot.link_names))]
+        evenly = {int(i) for i in np.linspace(0, len(robot.link_names) - 1, FRAMES - 1)}
+        links = [f"link:{robot.link_names[i]}" for i in sorted(evenly)]
         return cls(name, robot, (robot.sample(n), v, a), (robot.tip_frame, *links))
 
     def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
@@ -98,20 +95,18 @@ class Subject:
         return result
 
 
-def spread(count: int) -> list[int]:
-    """Return at most `FRAMES` - 1 evenly spread indices below `count`."""
-    return sorted({int(i) for i in np.linspace(0, count - 1, FRAMES - 1)})
-
-
 def same(x: FloatArray, y: FloatArray) -> bool:
     """Return whether two arrays have the same bits; 0 and -0 are different."""
     return x.shape == y.shape and x.tobytes() == y.tobytes()
 
 
-def differing(subject: Subject) -> Iterator[str]:
-    """Yield the names of results that differ from the results of single calls."""
+def differing(subject: Subject, now: Arrays) -> Iterator[str]:
+    """Yield the results in batches, of prepared frames and of several frames that differ from other calls."""
     frame = subject.frames[0]
     for what, quantity, reference, inputs in subject.results():
+        few = [x[:KEPT] for x in inputs]
+        if not same(subject.computed(quantity, reference, subject.frames, few), now[what]):
+            yield f"{what}: several frames in one pass"
         rows = list(zip(*inputs, strict=True))
         single = np.stack([subject.computed(quantity, reference, frame, row) for row in rows])
         if not np.isfinite(single).all():
@@ -132,14 +127,6 @@ def differing(subject: Subject) -> Iterator[str]:
                         yield f"{what}: row {k} of {n} from {first} on, threads={threads}"
 
 
-def differing_in_one_pass(subject: Subject, now: Arrays) -> Iterator[str]:
-    """Compute several frames in one pass and in separate calls. Yield the results that differ."""
-    for what, quantity, reference, inputs in subject.results():
-        few = [x[:KEPT] for x in inputs]
-        if not same(subject.computed(quantity, reference, subject.frames, few), now[what]):
-            yield f"{what}: several frames in one pass"
-
-
 def differing_interpreted(subject: Subject) -> Iterator[str]:
     """Yield the results that differ between Python's numbers and the kernels."""
     for what, quantity, reference, inputs in subject.results():
@@ -151,15 +138,10 @@ def differing_interpreted(subject: Subject) -> Iterator[str]:
             yield f"{what}: interpreted"
 
 
-def given_of(subject: Subject, count: int) -> dict[str, Any]:
-    """Return the inputs of the first configurations, and the frames, under the names of a file."""
-    found = {f"{subject.name}/{x}": batch[:count] for x, batch in zip("qva", subject.inputs, strict=True)}
-    return {**found, f"{subject.name}/frames": np.array(subject.frames)}
-
-
 def to_keep(subject: Subject) -> dict[str, Any]:
-    """Return the inputs, the frames, and each result with its bound."""
-    stored = given_of(subject, max(LENGTHS))
+    """Return the inputs, the frames, and each result with its bound, under the names of a file."""
+    stored: dict[str, Any] = {f"{subject.name}/{x}": y for x, y in zip("qva", subject.inputs, strict=True)}
+    stored[f"{subject.name}/frames"] = np.array(subject.frames)
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
         parts = [subject.computed(quantity, reference, frame, few) for frame in subject.frames]
@@ -204,38 +186,6 @@ def compared(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
     )
 
 
-_DIGITS = (15, None)
-
-
-def enclosures(subject: Subject) -> dict[str, Any]:
-    """Return the lower and upper ends (2, ...) of all intervals of one sample."""
-    q, v, a = (batch[0] for batch in subject.inputs)
-    found = given_of(subject, 1)
-    drawn = draw_base(1, np.random.default_rng(1))
-    base = BaseMotion(np.round(drawn.placement[0], 9), drawn.velocity[0], drawn.acceleration[0])
-    for reference, digits, moves in product(Reference, _DIGITS, (None, base)):
-        proof = subject.robot.enclose(q, v, a, subject.frames[0], reference, base=moves, digits=digits)
-        for name in ("placement", "velocity", "acceleration", "jacobian", "jacobian_rate"):
-            part = getattr(proof, name)
-            what = f"{subject.name}/{part.quantity}/{reference.name}/{digits}/{moves is not None}"
-            found[what] = np.stack((part.lower, part.upper))
-    return found
-
-
-def nested(name: str, now: Arrays, stored: Arrays) -> tuple[str, float]:
-    """Compare intervals with stored ones; return a text, and the number of intervals that are outside."""
-    words, wrong = [], 0
-    for digits in _DIGITS:
-        names = [what for what in now if what.startswith(f"{name}/") and f"/{digits}/" in what]
-        new, old = (np.concatenate([x[what].reshape(2, -1) for what in names], axis=1) for x in (now, stored))
-        outside = (new[0] < old[0]) | (new[1] > old[1])
-        inside = ~outside & ((new[0] > old[0]) | (new[1] < old[1]))
-        counts = f"{new.shape[1]} intervals, {inside.sum()} narrower, {outside.sum()} outside"
-        words.append(f"{digits or 'default'}: {counts}")
-        wrong += int(outside.sum())
-    return "; ".join(words), float(wrong)
-
-
 def main(words: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     option = parser.add_argument
@@ -243,24 +193,18 @@ def main(words: Sequence[str] | None = None) -> int:
     option("--write", type=Path, help="store the results in this file (.npz)")
     option("--against", type=Path, help="compare the results with those in this file")
     option("--within", type=float, default=0.0, help="allowed difference, as a fraction of the bound")
-    option("--enclosures", action="store_true", help="store or compare enclosures, not results")
     given = parser.parse_args(words)
     before = None if given.against is None else np.load(given.against)
     known = catalogue() if before is None else dict.fromkeys(name.partition("/")[0] for name in before)
-    compare = nested if given.enclosures else compared
     everything, wrong = dict[str, Any](), 0
     for name in given.robots or known:
         subject = Subject.of(name, before)
-        found: list[str] = []
-        if given.enclosures:
-            now = enclosures(subject)
-        else:
-            with only("compiled"):
-                now = to_keep(subject)
-                found += [*differing(subject), *differing_in_one_pass(subject, now)]
-            found += differing_interpreted(subject)
+        with only("compiled"):
+            now = to_keep(subject)
+            found = list(differing(subject, now))
+        found += differing_interpreted(subject)
         everything |= now
-        said, most = ("", 0.0) if before is None else compare(name, now, before)
+        said, most = ("", 0.0) if before is None else compared(name, now, before)
         print(f"{name:28} {digest(now)} {said}", *found[:3], sep="\n    " if found else " ", flush=True)
         wrong += bool(found) or most > given.within
     print(f"{'all robots':28} {digest(everything)} {wrong} wrong")

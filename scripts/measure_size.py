@@ -1,23 +1,16 @@
 """Measure the size of an installation of urdfkin, and write the size into docs/install.md.
 
-    python scripts/measure_size.py           print the sizes, and write the page
-    python scripts/measure_size.py --print   only print them
+    python scripts/measure_size.py
 
-The environment that scripts/try.sh makes is enough to print. To write the page, install all extras, for
-example by scripts/test.sh. Python, pip and bytecode are not counted.
+All extras must be installed, for example by scripts/test.sh. Python, pip and bytecode are not counted.
 """
 
-import argparse
-import contextlib
 import importlib.metadata
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-try:
-    from packaging.requirements import Requirement
-except ModuleNotFoundError:  # without extras, pip contains the only copy of this library
-    from pip._vendor.packaging.requirements import Requirement  # type: ignore[assignment,unused-ignore]
+from packaging.requirements import Requirement
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
@@ -25,7 +18,7 @@ from scripts.pages import DOCS, insert, table
 
 ROOT = Path(__file__).parents[1]
 PAGE = DOCS / "install.md"
-EXTRAS = ("plots", "view", "xacro", "mujoco", "descriptions", "cluster")
+EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 
 
 def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
@@ -71,27 +64,13 @@ def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tupl
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Measure the size of an installation.")
-    parser.add_argument("--print", action="store_true", help="print the sizes, and do not write the page")
-    only_print = parser.parse_args().print
     core = closure("urdfkin") | {"urdfkin": own()}
     lean = closure("urdfkin", without="yourdfpy") | {"urdfkin": own()}
     extras = {}
     for extra in EXTRAS:
-        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        try:
             added = {name: size for name, size in closure("urdfkin", [extra]).items() if name not in core}
-            extras[extra] = (len(added), sum(added.values()))
-    sizes = dict(sorted(core.items(), key=lambda item: -item[1])[:10]) | {
-        f"urdfkin and the {len(core) - 1} packages that it needs": sum(core.values()),
-        f"these without the packages of yourdfpy: {len(lean)} packages": sum(lean.values()),
-        "of these for pin, which is Pinocchio": sum(closure("pin").values()),
-        "urdfkin and click, which `urdfkin check` needs": own() + core["click"],
-        **{f"[{name}], {count} packages more": size for name, (count, size) in extras.items()},
-    }
-    for name, size in sizes.items():
-        print(f"{size / 1e6:7.0f} MB  {name}")
-    print(f"only yourdfpy needs: {', '.join(sorted(core.keys() - lean.keys()))}")
-    if missing := ", ".join(set(EXTRAS) - extras.keys()) * (not only_print):
-        sys.exit(f"the page is not written: install these extras first: {missing}")
-    if not only_print:
-        insert(PAGE, size=sentences(core, lean, extras))
+        except importlib.metadata.PackageNotFoundError as missing:
+            sys.exit(f"the page is not written: first install the extra {extra}, which needs {missing.name}")
+        extras[extra] = (len(added), sum(added.values()))
+    insert(PAGE, size=sentences(core, lean, extras))

@@ -9,7 +9,6 @@ import pytest
 from scripts import check_bits
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.verify.exact import numbers
 
 ROBOTS = ("polar", "planar_two_link")
 
@@ -67,16 +66,3 @@ def test_a_zero_of_the_other_sign_is_another_bit_and_no_difference() -> None:
     assert check_bits.share("r/x/LOCAL", {"r/x/LOCAL": np.zeros(1)}, kept) == 0.0
     assert 0.0 < check_bits.share("r/x/LOCAL", {"r/x/LOCAL": -np.zeros(1)}, kept) < 1e-300
     assert check_bits.share("r/x/LOCAL", {"r/x/LOCAL": np.full(1, 1e-300)}, kept) == np.inf
-
-
-@pytest.mark.parametrize(("more", "exit_code"), [(40, 0), (0, 1)], ids=["narrower", "wider"])
-def test_an_enclosure_must_lie_in_the_one_that_was_kept(
-    more: int, exit_code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> None:
-    kept = ["--enclosures", "--against", str(tmp_path / "kept.npz")]
-    assert check_bits.main(["polar", "--enclosures", "--write", kept[-1]]) == 0
-    assert check_bits.main(kept) == 0
-    assert "15: 312 intervals, 0 narrower, 0 outside" in capsys.readouterr().out
-    monkeypatch.setattr(numbers, "_MORE_BITS", more)
-    assert check_bits.main(kept) == exit_code
-    assert ("0 outside; default" in capsys.readouterr().out) == (exit_code == 0)
