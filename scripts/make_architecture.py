@@ -9,16 +9,16 @@ import ast
 import re
 import sys
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
-from scripts.pages import DOCS, inserted
-from scripts.pages import table as markdown
+from scripts.pages import DOCS, inserted, table
 
 ROOT = DOCS.parent
 PAGE, PICTURE = DOCS / "architecture.md", DOCS / "images" / "architecture.svg"
@@ -84,17 +84,17 @@ def all_named() -> Mapping[str, frozenset[str]]:
 
 @cache
 def imports() -> Mapping[str, frozenset[str]]:
-    known = modules()
-    return {module: frozenset(_of_ours(names, known)) - {module} for module, names in all_named().items()}
-
-
-def _of_ours(names: Iterable[str], known: Mapping[str, Path]) -> Iterator[str]:
-    for name in names:
-        head, _, last = name.rpartition(".")
-        if name in known and last not in _reexported(head):
-            yield name
-        elif head in known:
-            yield head
+    """Return the modules of this repository that each module imports."""
+    found: dict[str, frozenset[str]] = {}
+    for module, names in all_named().items():
+        heads = {name: name.rpartition(".")[::2] for name in names}
+        # A name is a submodule, or a name in a module.
+        ours = [
+            name if name in modules() and last not in _reexported(head) else head
+            for name, (head, last) in heads.items()
+        ]
+        found[module] = frozenset(ours) & modules().keys() - {module}
+    return found
 
 
 @cache
@@ -120,31 +120,18 @@ def upwards() -> list[str]:
 
 
 def cycles() -> list[list[str]]:
-    """List the groups of modules that import each other."""
-    reached = {module: _reached(module) for module in imports()}
-    groups = {frozenset(o for o in others if module in reached[o]) for module, others in reached.items()}
-    return sorted(sorted(group) for group in groups if group)
-
-
-def _reached(module: str) -> set[str]:
-    """Return all modules that a module imports directly or through other modules."""
-    seen: set[str] = set()
-    ahead = set(imports()[module])
-    while ahead:
-        seen |= ahead
-        ahead = set().union(*(imports()[other] for other in ahead)) - seen
-    return seen
+    """Return a list of modules that import each other in a cycle, if there are any."""
+    try:
+        TopologicalSorter(imports()).prepare()
+    except CycleError as error:
+        return [error.args[1]]
+    return []
 
 
 def arrows() -> set[tuple[str, str]]:
     """Return the pairs (package, imported package)."""
     pairs = ((package_of(one), package_of(other)) for one, others in imports().items() for other in others)
     return {(one, other) for one, other in pairs if one != other}
-
-
-def table() -> str:
-    rows = [(f"`{one.name}`", one.purpose, one.contents) for one in PACKAGES]
-    return markdown(("Package", "Purpose", "Contents"), rows)
 
 
 _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
@@ -180,7 +167,10 @@ def picture() -> str:
 
 
 def page() -> str:
-    return inserted(PAGE.read_text(encoding="utf-8"), packages=table())
+    """Return docs/architecture.md with a current table."""
+    rows = [(f"`{one.name}`", one.purpose, one.contents) for one in PACKAGES]
+    packages = table(("Package", "Purpose", "Contents"), rows)
+    return inserted(PAGE.read_text(encoding="utf-8"), packages=packages)
 
 
 if __name__ == "__main__":

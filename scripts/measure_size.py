@@ -68,9 +68,8 @@ if __name__ == "__main__":
     lean = closure("urdfkin", without="yourdfpy") | {"urdfkin": own()}
     extras = {}
     for extra in EXTRAS:
-        try:
-            added = {name: size for name, size in closure("urdfkin", [extra]).items() if name not in core}
-        except importlib.metadata.PackageNotFoundError as missing:
-            sys.exit(f"the page is not written: first install the extra {extra}, which needs {missing.name}")
+        added = {name: size for name, size in closure("urdfkin", [extra]).items() if name not in core}
+        if not added:
+            sys.exit(f"the page is not written: install urdfkin again with the extra {extra}")
         extras[extra] = (len(added), sum(added.values()))
     insert(PAGE, size=sentences(core, lean, extras))
