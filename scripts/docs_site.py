@@ -112,9 +112,8 @@ def on_files(files: Any, config: Any) -> Any:
     made |= {page: subject_page(page) for page in LIBRARY}
     for file in files.documentation_pages():
         if file.src_uri.startswith(LESSONS):
-            made[str(Path(file.src_uri).with_suffix(".ipynb"))] = json.dumps(
-                notebook(file.content_string), indent=1
-            )
+            name = str(Path(file.src_uri).with_suffix(".ipynb"))
+            made[name] = json.dumps(notebook(file.content_string), indent=1)
     for name, content in made.items():
         files.append(File.generated(config, name, content=content))
     return files
@@ -136,14 +135,11 @@ def on_page_content(content: str, **_: Any) -> str:
     def mathml(found: re.Match[str]) -> str:
         alone = found[0].startswith("<p>") and found[0].endswith("</p>")
         text = str(convert(html.unescape(found[1]), display="block" if alone else "inline"))
-        text = _NAME_OF_FUNCTION.sub(
-            r'\1<mspace width="0.17em"/>', text.replace("<mover>", '<mover accent="true">')
-        )
-        return (
-            f'<div class="formula">{text}</div>'
-            if alone
-            else found[0].replace(f"$<code>{found[1]}</code>$", text)
-        )
+        text = text.replace("<mover>", '<mover accent="true">')
+        text = _NAME_OF_FUNCTION.sub(r'\1<mspace width="0.17em"/>', text)
+        if alone:
+            return f'<div class="formula">{text}</div>'
+        return found[0].replace(f"$<code>{found[1]}</code>$", text)
 
     return _FORMULA.sub(mathml, content)
 

@@ -20,6 +20,9 @@ _OPERATIONS: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.FloorDiv: ast.Mult,
     ast.Pow: ast.Mult, ast.MatMult: ast.Add, ast.Mod: ast.Mult, ast.BitOr: ast.BitAnd, ast.BitAnd: ast.BitOr,
 }  # fmt: skip
+_STATEMENTS: dict[type[ast.stmt], type[ast.stmt]] = {
+    ast.Raise: ast.Pass, ast.Continue: ast.Break, ast.Break: ast.Continue,
+}  # fmt: skip
 _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
@@ -46,16 +49,13 @@ class Slip:
     @contextmanager
     def made(self) -> Iterator[Any]:
         """Change the tree in place until the end of the `with` block; yield the previous value."""
-        old = self._put(self.value)
+        old = self.put(self.value)
         try:
             yield old
         finally:
-            self._put(old)
+            self.put(old)
 
-    def make(self) -> None:
-        self._put(self.value)
-
-    def _put(self, value: Any) -> Any:
+    def put(self, value: Any) -> Any:
         """Set a value and return the previous one."""
         if isinstance(self.place, int):
             old, self.home[self.place] = self.home[self.place], value
@@ -72,19 +72,20 @@ def slips(tree: ast.Module) -> list[Slip]:
 
 def mutated(source: str, number: int) -> ast.Module:
     tree = ast.parse(source)
-    slips(tree)[number].make()
+    slip = slips(tree)[number]
+    slip.put(slip.value)
     return ast.fix_missing_locations(tree)
-
-
-def function_at(tree: ast.Module, line: int) -> str:
-    """Return the function or class around a line, such as `Tally.percentile`, or "" if there is none."""
-    return ".".join(node.name for node in _definitions(tree) if node.lineno <= line <= (node.end_lineno or 0))
 
 
 @lru_cache(maxsize=1)
 def _definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]:
     kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
     return sorted((node for node in ast.walk(tree) if isinstance(node, kinds)), key=lambda node: node.lineno)
+
+
+def function_at(tree: ast.Module, line: int) -> str:
+    """Return the function or class around a line, such as `Tally.percentile`, or "" if there is none."""
+    return ".".join(node.name for node in _definitions(tree) if node.lineno <= line <= (node.end_lineno or 0))
 
 
 def rewritten(source: str, before: str, after: str) -> ast.Module:
@@ -123,7 +124,7 @@ def _of_expression(node: ast.AST) -> Iterator[Slip]:
         case ast.UnaryOp(op=ast.USub()):
             yield Slip(node, node, "op", ast.UAdd())
         case ast.UnaryOp(op=ast.Not()):
-            yield Slip(node, node, "operand", _not(node.operand))
+            yield Slip(node, node, "operand", ast.UnaryOp(ast.Not(), node.operand))
         case ast.Constant(value=bool() | int() | float() as value):
             yield Slip(node, node, "value", _other(value))
         case ast.Name(id=name) if name in _NAMES:
@@ -132,36 +133,23 @@ def _of_expression(node: ast.AST) -> Iterator[Slip]:
 
 def _of_statement(node: ast.AST) -> Iterator[Slip]:
     match node:
-        case ast.If(test=ast.Name() | ast.Attribute() | ast.Call() as test):
-            yield Slip(node, node, "test", _not(test))
-        case ast.IfExp(test=ast.Name() | ast.Attribute() | ast.Call() as test):
-            yield Slip(node, node, "test", _not(test))
+        case ast.If(test=test) | ast.IfExp(test=test) if isinstance(
+            test, ast.Name | ast.Attribute | ast.Call
+        ):
+            yield Slip(node, node, "test", ast.UnaryOp(ast.Not(), test))
         case ast.Expr(value=ast.Call()):
             yield Slip(node, node, "value", ast.Constant(None))
     for field in ("body", "orelse", "finalbody"):
         statements = getattr(node, field, None)
-        if isinstance(statements, list):
-            yield from _left_out(statements)
-
-
-def _left_out(statements: list[ast.stmt]) -> Iterator[Slip]:
-    for i, statement in enumerate(statements):
-        if isinstance(statement, ast.Raise):
-            yield Slip(statement, statements, i, ast.Pass())
-        elif isinstance(statement, ast.Continue):
-            yield Slip(statement, statements, i, ast.Break())
-        elif isinstance(statement, ast.Break):
-            yield Slip(statement, statements, i, ast.Continue())
+        for i, statement in enumerate(statements if isinstance(statements, list) else ()):
+            if (other := _STATEMENTS.get(type(statement))) is not None:
+                yield Slip(statement, statements, i, other())
 
 
 def _short(node: ast.AST) -> str:
     if isinstance(node, ast.If):
         return f"if {ast.unparse(node.test)}"
     return " ".join(ast.unparse(ast.fix_missing_locations(node)).split())[:90]
-
-
-def _not(test: ast.expr) -> ast.expr:
-    return ast.UnaryOp(ast.Not(), test)
 
 
 def _other(value: bool | int | float) -> bool | int | float:
