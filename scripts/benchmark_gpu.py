@@ -33,8 +33,6 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
-
 import urdfkin
 from scripts.benchmarking.contenders import positions
 from scripts.pages import table as markdown

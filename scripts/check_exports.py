@@ -34,8 +34,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
-
 import urdfkin
 from scripts.benchmarking.subject import chain_urdf
 from scripts.pages import DOCS, inserted, table

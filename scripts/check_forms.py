@@ -27,8 +27,6 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
-
 import urdfkin
 from scripts.forms import poses
 from scripts.pages import table as markdown

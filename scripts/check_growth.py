@@ -18,9 +18,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
 
 from scripts.pages import table
 from urdfkin.urdf.lint import check_text

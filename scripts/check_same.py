@@ -25,8 +25,6 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
-
 import urdfkin
 from tests.comparison.pairs import ALIKE, UNLIKE, changed, robot
 from tests.comparison.searching import far, searched

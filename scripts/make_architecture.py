@@ -16,8 +16,6 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
-
 from scripts.pages import DOCS, inserted, table
 
 ROOT = DOCS.parent

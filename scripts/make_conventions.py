@@ -24,8 +24,6 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
-
 import urdfkin
 from scripts.pages import DOCS, inserted, table
 from urdfkin.model.conventions import Convention, find_convention

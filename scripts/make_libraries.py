@@ -12,7 +12,6 @@ Pinocchio checks; tests/test_libraries.py compares them with a reader that was w
 import argparse
 import json
 import subprocess
-import sys
 import tomllib
 import venv
 from collections import Counter
@@ -22,8 +21,6 @@ from typing import Any
 
 import numpy as np
 import platformdirs
-
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from scripts.pages import DOCS, inserted, table

@@ -11,7 +11,6 @@ of their numbers. The figures of docs/performance.md and its picture are those o
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -19,8 +18,6 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from scripts.benchmarking import tables

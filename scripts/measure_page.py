@@ -7,14 +7,11 @@ over several runs, each with a new browser profile. The script needs Debian's ch
 """
 
 import argparse
-import sys
 import tempfile
 import time
 from itertools import cycle, islice
 from pathlib import Path
 from statistics import median
-
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 from tests.report.browser import opened
 from urdfkin.report.html import as_files

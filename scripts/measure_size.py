@@ -12,8 +12,6 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
-
 from scripts.pages import DOCS, insert, table
 
 ROOT = Path(__file__).parents[1]

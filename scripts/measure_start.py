@@ -21,8 +21,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
-
 from scripts.pages import DOCS, insert, table
 
 ROOT = Path(__file__).parents[1]

@@ -28,8 +28,6 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # run from a checkout that is not installed
-
 import urdfkin
 from scripts.pages import table
 from urdfkin.comparison.bounds import MOST

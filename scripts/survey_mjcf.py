@@ -5,12 +5,9 @@ python scripts/survey_mjcf.py models
 """
 
 import argparse
-import sys
 import warnings
 from collections import Counter
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
 import urdfkin
 from urdfkin.errors import UrdfkinError
