@@ -20,14 +20,12 @@ import ctypes
 import importlib.util
 import json
 import shutil
-import statistics
 import subprocess
 import sys
 import sysconfig
 import tempfile
-import time
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -77,10 +75,16 @@ def bytes_of(code: FrameCode, function: Function, real: str) -> int:
 
 def program(code: FrameCode) -> str:
     """Return the text of the program that prints one JSON line for each measurement."""
+
+    def filled(text: str, **values: object) -> str:
+        for name, value in values.items():
+            text = text.replace(f"@{name}@", str(value))
+        return text
+
     measured = "\n".join(
-        _filled(_MEASURED, name=f.name, title=code.name, given=", ".join(f.inputs)) for f in code.functions
+        filled(_MEASURED, name=f.name, title=code.name, given=", ".join(f.inputs)) for f in code.functions
     )
-    return _filled(
+    return filled(
         _PROGRAM.read_text("utf-8").partition("\n")[2],
         UP=code.name.upper(),
         file=f"{code.name}.cuh",
@@ -91,12 +95,6 @@ def program(code: FrameCode) -> str:
         measured=measured,
         sizes=", ".join(map(str, SIZES)),
     )
-
-
-def _filled(text: str, **values: object) -> str:
-    for name, value in values.items():
-        text = text.replace(f"@{name}@", str(value))
-    return text
 
 
 def compiled(code: Code, folder: Path, compiler: str) -> dict[str, Path]:
@@ -139,7 +137,8 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
 def of_torch(robot: Robot, frame: str, code: Code, device: str = "cuda") -> Iterator[str]:
     """Yield JSON lines of PyTorch's export and of PyTorch Kinematics; raise ValueError for a wrong number."""
     try:
-        import torch  # noqa: PLC0415  optional
+        import torch  # noqa: PLC0415  this library is optional
+        from torch.utils.benchmark import Timer  # noqa: PLC0415
     except ModuleNotFoundError:
         return
     if device == "cuda" and not torch.cuda.is_available():
@@ -150,16 +149,16 @@ def of_torch(robot: Robot, frame: str, code: Code, device: str = "cuda") -> Iter
         raise ValueError("PyTorch's export computes a number outside its bound")
     for function in code.functions:
         call = scope[function.name]
-        ways: list[tuple[str, Callable[..., Any]]] = [
-            ("PyTorch", call),
-            ("torch.compile", torch.compile(call)),
-        ]
+        ways: dict[str, Callable[..., Any]] = {"PyTorch": call, "torch.compile": torch.compile(call)}
         if function.name == "jacobian" and importlib.util.find_spec("pytorch_kinematics"):
-            ways.append(("PyTorch Kinematics", _chain(robot, frame, device)))
-        for (by, call), real, n in ((x, real, n) for x in ways for real in _BYTES for n in SIZES):
+            ways["PyTorch Kinematics"] = _chain(robot, frame, device)
+        for by, real, n in product(ways, _BYTES, SIZES):
             kind = {"dtype": getattr(torch, real), "device": device}
-            inputs = [torch.rand((n, width), **kind) for width in code.widths(function).values()]
-            found = _seconds(partial(call, *inputs), device)
+            names: dict[str, Any] = {
+                "call": ways[by],
+                "inputs": [torch.rand((n, width), **kind) for width in code.widths(function).values()],
+            }
+            found = Timer("call(*inputs)", globals=names).blocked_autorange().median
             yield json.dumps({"by": by, "quantity": function.name, "real": real, "n": n, "s": found})
 
 
@@ -182,24 +181,6 @@ def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
     return lambda q: chains[q.dtype].jacobian(q[:, columns])
 
 
-def _seconds(call: Callable[[], Any], device: str) -> float:
-    """Return the median time of a call, in seconds, after three calls to warm up."""
-    import torch  # noqa: PLC0415  optional
-
-    times = list[float]()
-    for _ in range(LAUNCHES + 3):
-        if device == "cuda":
-            start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
-            start.record(), call(), end.record()
-            end.synchronize()
-            times.append(1e-3 * start.elapsed_time(end))
-        else:
-            before = time.perf_counter()
-            call()
-            times.append(time.perf_counter() - before)
-    return statistics.median(times[3:])
-
-
 def main(words: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     option = parser.add_argument
@@ -207,44 +188,43 @@ def main(words: list[str] | None = None) -> int:
     option("--frame", help="link or joint; the default is the robot's tip")
     option("--json", type=Path, help="file for the measurements, one per line")
     option("--compile-only", action="store_true", help="compile the programs, and run none")
-    arguments = parser.parse_args(words)
+    given = parser.parse_args(words)
     if (compiler := nvcc()) is None:
-        return _refused("nvcc is not installed. Install CUDA, or run `make nvcc`.")
-    if not arguments.compile_only and not gpus():
-        return _refused("CUDA's driver finds no GPU here. Run on a machine with one, or use --compile-only.")
-    robot = urdfkin.load(arguments.robot)
-    code = code_of_robot(robot, arguments.frame or robot.tip_frame, QUANTITIES, "local_world_aligned")
+        return _failed("nvcc is not installed. Install CUDA, or run `make nvcc`.")
+    if not given.compile_only and not gpus():
+        return _failed("CUDA's driver finds no GPU here. Run on a machine with one, or use --compile-only.")
+    robot = urdfkin.load(given.robot)
+    frame = given.frame or robot.tip_frame
+    code = code_of_robot(robot, frame, QUANTITIES, "local_world_aligned")
     with tempfile.TemporaryDirectory() as folder:
         try:
             programs = compiled(code, Path(folder), compiler)
         except subprocess.CalledProcessError as error:
-            return _refused(f"the program does not compile: {compiler} exits with {error.returncode}.")
-        if arguments.compile_only:
+            return _failed(f"the program does not compile: {compiler} exits with {error.returncode}.")
+        if given.compile_only:
             print(f"compiled, not run: {', '.join(programs)}")
             return 0
         for real in _BYTES:
             done = subprocess.run([str(programs[real])], capture_output=True, text=True, check=False)
             print(done.stdout, end="")
             if done.returncode or done.stdout.count(" on the GPU") != len(code.functions):
-                print(f"the check in {real} precision failed on the GPU: {done.stderr}", file=sys.stderr)
-                return 1
+                return _failed(f"the check in {real} precision failed on the GPU: {done.stderr}", 1)
         lines = subprocess.run([str(programs["measure"])], capture_output=True, text=True, check=True).stdout
     found, status = lines.splitlines(), 0
     try:
-        found.extend(of_torch(robot, arguments.frame or robot.tip_frame, code))
+        found.extend(of_torch(robot, frame, code))
     except ValueError as error:
-        print(f"benchmark_gpu.py: {error}", file=sys.stderr)
-        status = 1
+        status = _failed(str(error), 1)
     measured = list(rows(code, found))
     print(table(measured))
-    if arguments.json:
-        arguments.json.write_text("".join(f"{json.dumps(row)}\n" for row in measured), encoding="utf-8")
+    if given.json:
+        given.json.write_text("".join(f"{json.dumps(row)}\n" for row in measured), encoding="utf-8")
     return status
 
 
-def _refused(reason: str) -> int:
+def _failed(reason: str, status: int = 2) -> int:
     print(f"benchmark_gpu.py: {reason}", file=sys.stderr)
-    return 2
+    return status
 
 
 if __name__ == "__main__":
