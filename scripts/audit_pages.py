@@ -202,7 +202,7 @@ def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
 
 @contextmanager
 def viewer(plays: bool = False) -> Iterator[Page]:
-    from urdfkin.view.server import new_server  # noqa: PLC0415  of the extra `view`
+    from urdfkin.view.server import new_server  # noqa: PLC0415  the extra `view` has its library
     from urdfkin.view.viewer import Viewer  # noqa: PLC0415
 
     server = new_server(port=8097)

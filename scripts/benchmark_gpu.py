@@ -164,7 +164,7 @@ def of_torch(robot: Robot, frame: str, code: Code, device: str = "cuda") -> Iter
 
 def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
     """Return PyTorch Kinematics' Jacobian of the path; raise ValueError if it is not that of `robot`."""
-    import pytorch_kinematics  # noqa: PLC0415  optional
+    import pytorch_kinematics  # noqa: PLC0415  this library is optional
     import torch  # noqa: PLC0415
 
     chain = pytorch_kinematics.build_serial_chain_from_urdf(robot.urdf, frame)

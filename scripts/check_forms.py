@@ -58,7 +58,7 @@ _DOCUMENT = r"""\documentclass{article}
 """
 
 
-class Missing(Exception):  # noqa: N818  not an error: the run continues
+class Missing(Exception):  # noqa: N818  the run continues, so this is no error
     """Error if an interpreter or library of a format is not installed."""
 
 

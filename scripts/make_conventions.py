@@ -229,7 +229,7 @@ def _motions(asked: MeasuredMotion) -> Iterator[Row]:
         f"`cvel`: {which(np.array(asked.mj_data.cvel[asked.body]), points)}",
     )
     linear_first = asked.acceleration_readings(flipped=False)
-    ours = which(robot.acceleration(asked.q, asked.v, asked.a, "l3"), linear_first)
+    result = which(robot.acceleration(asked.q, asked.v, asked.a, "l3"), linear_first)
     spatial, classical = (
         which(get(*frame, pin.LOCAL_WORLD_ALIGNED).vector, linear_first)
         for get in (pin.getFrameAcceleration, pin.getFrameClassicalAcceleration)
@@ -238,7 +238,7 @@ def _motions(asked: MeasuredMotion) -> Iterator[Row]:
     of_mujoco = which(six, asked.acceleration_readings(flipped=True))
     yield (
         "acceleration, in world axes",
-        f"`acceleration`: {ours}",
+        f"`acceleration`: {result}",
         f"`getFrameAcceleration`: {spatial}; `getFrameClassicalAcceleration`: {classical}",
         f"`mj_objectAcceleration`: {of_mujoco}, [angular; linear]",
     )

@@ -90,27 +90,21 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
     yield Work(FLOOR, n, partial(floor.fill, 1.0))
 
 
-def urdfkin_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    prepared = {"fast": subject.robot.prepare(subject.frame), "own": subject.robot.compiled(subject.frame)}
-    lines = ("robot.{}, frame, verify=False)", "fast.{})", "fast.{}, out=out)", "own.{}, out=out)")
-    yield from _urdfkin_lines(subject, quantity, prepared, lines)
-
-
-def checked_calls(subject: Subject, quantity: str) -> Iterator[Calls]:
-    prepared = {"fast": subject.robot.prepare(subject.frame, verify=True)}
-    yield from _urdfkin_lines(subject, quantity, prepared, ("robot.{}, frame, verify=True)", "fast.{})"))
-
-
-def _urdfkin_lines(
-    subject: Subject, quantity: str, prepared: dict[str, Any], lines: Sequence[str]
-) -> Iterator[Calls]:
-    out = np.empty(subject.width(quantity))
-    names = {"robot": subject.robot, "frame": subject.frame, "out": out, **prepared}
-    for line in lines:
-        line = line.format(f"{quantity}({'q' if quantity == 'jacobian' else 'q, v, a'}")  # noqa: PLW2901
-        who, _, given = line.replace("fast", "prepared").replace("own", "compiled").partition("(")
-        shown = [word for word in ("verify=False", "verify=True", "out=") if word in given]
-        yield Calls(f"urdfkin, {who}({', '.join(shown)})", names, (line,))
+def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
+    """Yield the calls of the robot's method and of prepared frames, all of them checked or none."""
+    robot, frame = subject.robot, subject.frame
+    names = {"robot": robot, "frame": frame, "out": np.empty(subject.width(quantity))}
+    names["prepared"] = robot.prepare(frame, verify=verify)
+    call = f"{quantity}({'q' if quantity == 'jacobian' else 'q, v, a'}"
+    lines = {
+        f"robot.{quantity}(verify={verify})": f"robot.{call}, frame, verify={verify})",
+        f"prepared.{quantity}()": f"prepared.{call})",
+    }
+    if not verify:
+        names["compiled"] = robot.compiled(frame)
+        lines |= {f"{who}.{quantity}(out=)": f"{who}.{call}, out=out)" for who in ("prepared", "compiled")}
+    for shown, line in lines.items():
+        yield Calls(f"urdfkin, {shown}", names, (line,))
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:

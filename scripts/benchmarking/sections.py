@@ -19,9 +19,9 @@ from scripts.benchmarking.contenders import (
     PROCESSES,
     Contender,
     all_joints_calls,
-    checked_calls,
     pinocchio_calls,
     urdfkin_batches,
+    urdfkin_calls,
 )
 from scripts.benchmarking.operations import operations
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, chain_urdf
@@ -60,7 +60,8 @@ def contest_rows(section: str, n: int, contenders: Sequence[Contender], rounds: 
             works = [one.single(subject, quantity) for one in found]
             baseline = next(work for work in works if work.who == LOOP)
         elif section == "checked":
-            works = [one.single(subject, quantity) for one in (*checked_calls(subject, quantity), calls)]
+            checked = urdfkin_calls(subject, quantity, verify=True)
+            works = [one.single(subject, quantity) for one in (*checked, calls)]
             baseline = works[-1]
         else:
             baseline = loop = replace(loop, who=STORED)

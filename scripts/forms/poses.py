@@ -22,7 +22,7 @@ def poses(form: str, text: str, q: list[list[float]]) -> list[list[list[float]]]
         return [scope["robot"].fkine(one).A.tolist() for one in q]
     place = scope["placement"]
     if form == "sympy":
-        from sympy import Float  # noqa: PLC0415  one library for each format
+        from sympy import Float  # noqa: PLC0415  each format needs one library
 
         exact = [place([Float(x, 30) for x in one]) for one in q]
         return [[[float(x) for x in row] for row in T.tolist()] for T in exact]
