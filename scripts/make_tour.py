@@ -93,27 +93,24 @@ def velocity_field(figure: Any) -> None:
     axes.set_title("7.21: the velocity of every point is w x p")
 
 
-def draw_frame(axes: Any, R: FloatArray, size: float, names: str) -> None:
-    for i, color in enumerate(AXES):
-        axes.quiver(0, 0, 0, *(size * R[:, i]), color=color, arrow_length_ratio=0.12, linewidth=2.2)
-        axes.text(*(1.16 * size * R[:, i]), f"{names}{'xyz'[i]}", color=color, ha="center", va="center")
-
-
-def turning(first: int, second: int) -> Callable[[float], FloatArray]:
-    """Return w(t) of a quarter turn in one second about one axis of frame 0, then about another."""
-    return lambda t: np.pi / 2 * np.eye(3)[first if t < 1.0 else second]
-
-
 def integral_of_w(figure: Any) -> None:
     """Draw two different orientations with the same integral of w (example 7.3 and figure 7.9)."""
     cases = (("case 1: about x0, then about y0", (0, 1)), ("case 2: about y0, then about x0", (1, 0)))
+    times = np.linspace(0.0, 2.0, 201)
     for row, (title, order) in enumerate(cases):
-        quats = integrate_orientation(turning(*order), [0.0, 0.0, 0.0, 1.0], np.linspace(0.0, 2.0, 201))
+
+        def w(t: float, order: tuple[int, int] = order) -> FloatArray:
+            """Return the velocity of a quarter turn in one second about one axis, then about the other."""
+            return np.pi / 2 * np.eye(3)[order[0 if t < 1.0 else 1]]
+
+        quats = integrate_orientation(w, [0.0, 0.0, 0.0, 1.0], times)
         for column, step in enumerate((0, 100, 200)):
             axes = figure.add_subplot(2, 3, 3 * row + column + 1, projection="3d")
             for axis in 1.25 * np.eye(3):
                 axes.quiver(0, 0, 0, *axis, color="#cfd6dd", arrow_length_ratio=0.06, linewidth=1)
-            draw_frame(axes, rotation_of(quats[step]), 1.0, "")
+            for axis, color, name in zip(rotation_of(quats[step]).T, AXES, "xyz", strict=True):
+                axes.quiver(0, 0, 0, *axis, color=color, arrow_length_ratio=0.12, linewidth=2.2)
+                axes.text(*(1.16 * axis), name, color=color, ha="center", va="center")
             path = rotation_of(quats[: step + 1])[:, :, 2]
             axes.plot(*path.T, color=BLUE, linewidth=1, linestyle=":")
             axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))

@@ -58,7 +58,8 @@ def odd_axis(rng: random.Random) -> list[float]:
     if rng.random() < 0.5:
         tilt = 10.0 ** rng.uniform(-20, -3)
         axis = [x + tilt * rng.gauss(0.0, 1.0) for x in axis]
-    return [x * odd_size(rng) for x in axis] if rng.random() < 0.05 else _scaled(axis, odd_size(rng))
+    size = odd_size(rng)
+    return [x * (odd_size(rng) if rng.random() < 0.05 else size) for x in axis]
 
 
 def odd_quaternion(rng: random.Random) -> list[float]:
@@ -72,7 +73,8 @@ def odd_quaternion(rng: random.Random) -> list[float]:
             [rng.choice((0.0, 1.0, -1.0, 1e-310)) for _ in range(4)],
         )
     )
-    return _scaled(numbers, odd_size(rng))
+    size = odd_size(rng)
+    return [x * size for x in numbers]
 
 
 def odd_size(rng: random.Random) -> float:
@@ -103,7 +105,3 @@ def odd_limit(rng: random.Random) -> str:
     refused = ("-1.0", "-5e-324", "inf", "nan", "", "1e400", "0x10", "1.0 ")
     fine = ("0", "-0.0", "1e300", "5e-324", "1e-400")
     return rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, written(rng, rng.random())))
-
-
-def _scaled(numbers: list[float], factor: float) -> list[float]:
-    return [x * factor for x in numbers]
