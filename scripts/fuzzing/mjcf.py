@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from scripts.fuzzing import Case
-from scripts.fuzzing import odd_numbers as odd
+from scripts.fuzzing.robots import direction, tame_length
 from urdfkin.model.tree import JointKind, LinkFrame
 from urdfkin.robot import Robot
 
@@ -102,7 +102,7 @@ class _File:
         large = rng.random() < 0.2
         words = (
             f'type="{rng.choice(("hinge", "hinge", "slide"))}"',
-            f'axis="{" ".join(map(repr, odd.direction(rng)))}"',
+            f'axis="{" ".join(map(repr, direction(rng)))}"',
             f'pos="{self.vector()}"',
             f'ref="{rng.uniform(-2.0, 2.0) * (1e4 if large else 1.0)!r}"',
             f'range="{lower!r} {upper + 0.1!r}" limited="true"',
@@ -116,13 +116,13 @@ class _File:
             "",
             f'quat="{" ".join(repr(rng.gauss(0.0, 1.0)) for _ in range(4))}"',
             f'euler="{" ".join(repr(rng.uniform(-angle, angle)) for _ in range(3))}"',
-            f'axisangle="{" ".join(map(repr, odd.direction(rng)))} {rng.uniform(-angle, angle)!r}"',
+            f'axisangle="{" ".join(map(repr, direction(rng)))} {rng.uniform(-angle, angle)!r}"',
             f'xyaxes="1 {rng.random()!r} 0 0 1 {rng.random()!r}"',
         )
         return rng.choice(notations)
 
     def vector(self) -> str:
-        return " ".join(repr(odd.tame_length(self.rng)) for _ in range(3))
+        return " ".join(repr(tame_length(self.rng)) for _ in range(3))
 
     def equalities(self) -> str:
         """Return constraints between joints, such as chains, cycles, duplicates and nonlinear constraints."""
