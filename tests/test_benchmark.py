@@ -20,7 +20,7 @@ from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender, breadth_fi
 from scripts.benchmarking.machine import EMPTY, KEPT, USES
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, bare_urdf, chain_urdf
 from scripts.benchmarking.tables import tables
-from scripts.benchmarking.timing import Calls, DifferenceError, Table, Work, agree, measure
+from scripts.benchmarking.timing import Calls, DifferenceError, Row, Work, agree, measure
 from tests.urdfs import joint, robot
 from urdfkin.compiled.plan import StepField, program_of
 from urdfkin.model.tree import FloatArray
@@ -81,7 +81,7 @@ def test_each_contender_computes_once_untimed_and_once_timed_in_each_round() -> 
         sum(range(100_000 if who == "slow" else 100))
 
     works = [Work(who, 10, lambda who=who: compute(who)) for who in counts]  # type: ignore[misc]
-    slow, fast = measure(Table("batch", "none", "sum", 1), works, 5, works[0])
+    slow, fast = measure(Row("batch", "none", "sum", 1), works, 5, works[0])
     assert counts == {"slow": 10, "fast": 10}
     assert slow.ratio == 1.0
     assert fast.ratio is not None

@@ -25,7 +25,7 @@ from scripts.benchmarking.contenders import (
 )
 from scripts.benchmarking.operations import operations
 from scripts.benchmarking.subject import QUANTITIES, SUBJECTS, TIP, Subject, chain_urdf
-from scripts.benchmarking.timing import Calls, Row, Table, Work, agree, measure, times
+from scripts.benchmarking.timing import Calls, Row, Work, agree, measure, times
 from urdfkin.compiled.evaluate import is_staged, task_of
 from urdfkin.compiled.machine import kernels
 from urdfkin.compiled.machine.single import single
@@ -87,15 +87,15 @@ def _verified(subject: Subject, quantity: str, verify: bool | str) -> Work:
     return Work(f"urdfkin, verify={verify!r}", subject.loop, compute, lambda: out)
 
 
-def _contests(section: str, n: int) -> Iterator[tuple[Subject, str, Table]]:
+def _contests(section: str, n: int) -> Iterator[tuple[Subject, str, Row]]:
     for source in SUBJECTS:
         with Subject(*source, n) as subject:
             for quantity in QUANTITIES:
                 yield subject, quantity, _table(section, subject, quantity)
 
 
-def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Table:
-    return Table(section, subject.name, quantity, subject.numbers(quantity), size)
+def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Row:
+    return Row(section, subject.name, quantity, subject.numbers(quantity), size)
 
 
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
@@ -139,7 +139,7 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 
             works = [Work(ONE_PASS, n, together, together), Work(ONE_BY_ONE, n, apart, apart)]
             agree(works, works[1], f"{subject.name}, {count} placements")
-            table = Table("frames", subject.name, "placement", 16 * count, count)
+            table = Row("frames", subject.name, "placement", 16 * count, count)
             yield from measure(table, works, rounds, works[1])
 
 

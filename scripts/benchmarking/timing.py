@@ -10,7 +10,7 @@ import gc
 import random
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,16 +34,14 @@ class Work:
 
 
 @dataclass(frozen=True)
-class Table:
-    section: str  # a name of `sections.SECTIONS`
+class Row:
+    """A row of a table: the properties of the table, and the measurements of one contender."""
+
+    section: str  # a name of `benchmark.SECTIONS`
     robot: str  # a name of the catalogue, or the number of joints of a chain
     quantity: str  # jacobian, acceleration or placement
     numbers: int  # number of float64 values of one configuration's result
     size: int = 0  # number of joints, frames or configurations, whichever the table varies
-
-
-@dataclass(frozen=True)
-class Row(Table):
     who: str = ""  # name of the contender
     n: int = 0  # number of configurations of a call
     median_ns: float = 0.0  # median time for one configuration over the rounds
@@ -98,7 +96,7 @@ def times(
 
 
 def measure(
-    table: Table,
+    table: Row,
     works: Sequence[Work],
     rounds: int,
     baseline: Work | None = None,
@@ -108,8 +106,8 @@ def measure(
     found = times(works, rounds, clock)
     medians = {who: float(np.median(values)) for who, values in found.items()}
     return [
-        Row(
-            **asdict(table),
+        replace(
+            table,
             who=work.who,
             n=work.n,
             median_ns=round(medians[work.who], 3),
