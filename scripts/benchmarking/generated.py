@@ -1,12 +1,10 @@
-"""Generate code for one robot, frame and quantity; its speed is an upper limit for a general kernel.
+"""Generate C code for one robot, frame and quantity; its speed is an upper limit for a general kernel.
 
-The textbook's equations run once on CasADi's symbols. The resulting expressions contain the robot's
-constants, without products with 0 and 1. CasADi writes these expressions as straight-line C code, which the
-system's compiler compiles. Each number of the C code is a vector register of doubles, with one double for
-each of several configurations (`generated.c`). The time includes sine, cosine and the transposition of the
-arrays, which are the same for all contenders. The code does not check its inputs, so a non-finite number or
-an angle of a million turns gives a wrong result. The generated code also lacks urdfkin's correction of the
-last digit of sine and cosine.
+CasADi writes the textbook's equations with the robot's constants as straight-line C, without products with 0
+and 1. The numbers are vectors of doubles, with one configuration in each lane (`generated.c`). The time
+includes sine, cosine and the transposition of the arrays. The code does not check its inputs, so a non-finite
+number or an angle of a million turns gives a wrong result. It lacks urdfkin's correction of the last digit of
+sine and cosine.
 """
 
 import ctypes

@@ -1,7 +1,6 @@
-"""Describe the machine, and measure the memory of a batch and the time of a first use in new processes.
+"""Describe the machine; measure the memory of a batch and the time of a first use in new processes.
 
-This module runs itself in a new process, in which no kernel is compiled and no library is loaded yet. For
-each process, Linux reports the largest memory size since the last reset of this number.
+This module runs itself in a new process, in which no kernel is compiled and no library is loaded yet.
 """
 
 import json

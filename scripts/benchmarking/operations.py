@@ -1,8 +1,7 @@
-"""Count the additions and multiplications of one configuration by executing them.
+"""Count the additions and multiplications of one configuration, by numbers that count their operations.
 
-The functions of the forward recursion run on numbers that count their operations. A fused multiply-add counts
-as two operations, as in the stated peak performance of a machine. A change of sign and a product with a known
-0 or 1 are not counted.
+A fused multiply-add counts as two operations, as in the stated peak performance of a machine. A change of
+sign and a product with a known 0 or 1 do not count.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""Plot the measurements of the benchmark.
-
-The picture shows the time of each contender for one configuration, and the growth of urdfkin's time with the
-number of joints and with the size of a batch.
-"""
+"""Plot the times of all contenders, and the growth of urdfkin's time with joints and with batches."""
 
 import re
 from collections.abc import Mapping, Sequence

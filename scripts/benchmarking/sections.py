@@ -1,8 +1,4 @@
-"""Measure the sections of the benchmark; a section consists of rows of measurements.
-
-Each generator compares the results of all contenders before it measures times, and raises `DifferenceError`
-if results differ.
-"""
+"""Measure the sections of the benchmark, each after a comparison of all results."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,9 +1,8 @@
-"""Measure the times of contenders, and check that all of them compute the same numbers.
+"""Time contenders, and check that all of them compute the same numbers.
 
-Every contender is timed once in each round, so that other load affects all of them. Ratios of one run are
-therefore reliable also on a noisy machine; absolute times are not. The order of the contenders changes in
-each round. Before a contender is timed, it computes once without timing. The data of this contender are then
-in the cache, and the threads of the previous contender sleep.
+Each round times every contender once, in another order. Ratios are therefore reliable on a noisy machine, and
+absolute times are not. Each contender first computes once without timing. Its data are then in the cache, and
+the threads of the previous contender sleep.
 """
 
 import gc

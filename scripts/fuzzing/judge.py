@@ -1,8 +1,6 @@
 """Test one robot: check it, load it, compute all quantities and compare them with Pinocchio.
 
-Every quantity is computed in each reference frame, single and in batches, on any base. urdfkin compares each
-call with Pinocchio. The results of different calls must have the same bits, because all calls use the same
-forward recursion. Every name of a frame must be accepted.
+Results of different calls must have the same bits, because all calls use the same forward recursion.
 """
 
 import traceback

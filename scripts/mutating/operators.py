@@ -1,8 +1,6 @@
 """Make all mutants of a file; each mutant changes one node of the file's syntax tree.
 
-The mutants are mistakes that tests often miss: a changed comparison, an inverted condition, another number,
-another sign, an omitted call, an error that is not raised. Texts, types and compiled kernels are not
-mutated.
+Texts, types and compiled kernels are not mutated.
 """
 
 import ast
