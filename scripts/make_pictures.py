@@ -21,7 +21,6 @@ from PIL import Image
 import urdfkin
 from scripts.make_tour import IMAGES, INK, QUIET, STYLE, arrow
 from tests.report.browser import Browser, opened
-from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.report.html import as_html
 from urdfkin.view.figure import GREEN, VERMILION
 from urdfkin.view.server import new_server
@@ -29,13 +28,6 @@ from urdfkin.view.viewer import Viewer
 
 POSE = [0.0, -0.8, 0.0, -2.4, 0.0, 1.6, 0.8, 0.04]
 THEMES = (("", False), ("-dark", True))
-
-
-def _axes(axes: Any, at: FloatArray, R: FloatArray) -> None:
-    for k, color in enumerate((VERMILION, GREEN)):
-        arrow(axes, at, 0.17 * R[:, k], color)
-        place = at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]
-        axes.text(*place, "xy"[k], color=color, ha="center", va="center", fontsize=9)
 
 
 def reference_frames() -> Any:
@@ -54,7 +46,10 @@ def reference_frames() -> Any:
         axes.plot(*points.T, "-o", zorder=1, **look)
         if reference == "world":
             axes.plot(*np.array([tip, at]).T, color=QUIET, linestyle=":", linewidth=1.2, zorder=0)
-        _axes(axes, at, R)
+        for k, color in enumerate((VERMILION, GREEN)):
+            arrow(axes, at, 0.17 * R[:, k], color)
+            place = at + 0.2 * R[:, k] + 0.045 * R[:, 1 - k]
+            axes.text(*place, "xy"[k], color=color, ha="center", va="center", fontsize=9)
         numbers = arm.velocity(q, v, "tip", reference)[:2]
         arrow(axes, at, 0.6 * R @ numbers, INK)
         for k, color in enumerate((VERMILION, GREEN)):
