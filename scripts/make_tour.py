@@ -101,7 +101,8 @@ def integral_of_w(figure: Any) -> None:
 
         def w(t: float, order: tuple[int, int] = order) -> FloatArray:
             """Return the velocity of a quarter turn in one second about one axis, then about the other."""
-            return np.pi / 2 * np.eye(3)[order[0 if t < 1.0 else 1]]
+            axis: FloatArray = np.eye(3)[order[0 if t < 1.0 else 1]]
+            return np.pi / 2 * axis
 
         quats = integrate_orientation(w, [0.0, 0.0, 0.0, 1.0], times)
         for column, step in enumerate((0, 100, 200)):
