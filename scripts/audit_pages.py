@@ -153,7 +153,7 @@ def reports(folder: Path) -> dict[str, Callable[[], str]]:
 def comparison(b: str, within: float | None) -> str:
     """Return the page that compares the UR5 with another robot."""
     robots = urdfkin.load("ur5"), urdfkin.load(b)
-    return same_page(same(*robots, within=within), robots, Question(within))
+    return same_page(same(*robots, within=within), robots, SameQuestion(within))
 
 
 def fleet_pages(folder: Path) -> Iterator[Page]:

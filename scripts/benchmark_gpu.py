@@ -97,7 +97,7 @@ def program(code: FrameCode) -> str:
     )
 
 
-def compiled(code: Code, folder: Path, compiler: str) -> dict[str, Path]:
+def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
     header, source = folder / f"{code.name}.cuh", folder / "measure.cu"
     header.write_text(write(code, "cuda"), encoding="utf-8")
     source.write_text(program(code), encoding="utf-8")
@@ -113,7 +113,7 @@ def compiled(code: Code, folder: Path, compiler: str) -> dict[str, Path]:
     return found
 
 
-def rows(code: Code, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
+def rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
     """Yield the measurements, with configurations per second and the share of the memory's bandwidth."""
     found = [json.loads(line) for line in lines]
     if not found or "bandwidth" not in found[0]:
@@ -134,7 +134,7 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
     return markdown(heads, rows, left=3)
 
 
-def of_torch(robot: Robot, frame: str, code: Code, device: str = "cuda") -> Iterator[str]:
+def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
     """Yield JSON lines of PyTorch's export and of PyTorch Kinematics; raise ValueError for a wrong number."""
     try:
         import torch  # noqa: PLC0415  this library is optional

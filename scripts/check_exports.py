@@ -56,7 +56,7 @@ _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
 
-def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> Code:
+def code(robot: Robot, frame: str, quantities: Sequence[str] = QUANTITIES) -> FrameCode:
     return code_of_robot(robot, frame, quantities, "local_world_aligned", verify=True)
 
 
