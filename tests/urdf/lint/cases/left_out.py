@@ -30,12 +30,21 @@ def _two(
 </mujoco>"""
 
 
+_RADIANS = '<compiler angle="radian"/>'
+
+
+def _hinge(ends: str, **parts: str) -> str:
+    return _two(joint=f'type="hinge" limited="true" range="{ends}"', **parts)
+
+
 def _held(*equalities: str) -> str:
     return _two(more=f"<equality>{''.join(equalities)}</equality>")
 
 
 _USELESS = "left out, since kinematics does not use them: "
 _SPATIAL = '<tendon><spatial name="t"><site site="s"/><site site="r"/></spatial></tendon>'
+
+_MOTOR = '<actuator><motor joint="a"/></actuator>'
 
 CASES = [
     Mjcf("nothing", _two()),
@@ -88,24 +97,15 @@ CASES = [
     ),
     Mjcf(
         "radians-in-a-file-in-degrees",
-        _two(joint='type="hinge" limited="true" range="-1.5 3.1416"'),
+        _hinge("-1.5 3.1416"),
         "MJCF201 compiler: the largest limit of a hinge is 3.142 degrees: the limits are probably radians",
     ),
-    Mjcf(
-        "ten-turns-in-a-file-in-radians",
-        _two(joint='type="hinge" limited="true" range="-63 63"', more='<compiler angle="radian"/>'),
-    ),
-    Mjcf(
-        "radians-in-a-file-in-radians",
-        _two(joint='type="hinge" limited="true" range="-0.1 0.1"', more='<compiler angle="radian"/>'),
-    ),
-    Mjcf("a-hinge-of-90-degrees", _two(joint='type="hinge" limited="true" range="-90 90"')),
+    Mjcf("ten-turns-in-a-file-in-radians", _hinge("-63 63", more=_RADIANS)),
+    Mjcf("radians-in-a-file-in-radians", _hinge("-0.1 0.1", more=_RADIANS)),
+    Mjcf("a-hinge-of-90-degrees", _hinge("-90 90")),
     Mjcf(
         "a-hinge-of-five-degrees-beside-one-of-90",
-        _two(
-            joint='type="hinge" limited="true" range="-5 5"',
-            inside='<joint name="c" limited="true" range="-90 0"/>',
-        ),
+        _hinge("-5 5", inside='<joint name="c" limited="true" range="-90 0"/>'),
     ),
     Mjcf(
         "a-free-body-that-stands-elsewhere",
@@ -115,10 +115,7 @@ CASES = [
     ),
     Mjcf(
         "shapes-lights-and-motors",
-        _two(
-            inside='<geom size="0.1"/><geom size="0.2"/><light/><camera/>',
-            more='<actuator><motor joint="a"/></actuator>',
-        ),
+        _two(inside='<geom size="0.1"/><geom size="0.2"/><light/><camera/>', more=_MOTOR),
         f"MJCF102 {_USELESS}1 actuators, 2 geoms, 1 cameras, 1 lights",
     ),
 ]
