@@ -108,15 +108,10 @@ def test_the_power_of_a_wrench_and_the_torques_it_asks_for_do_not_depend_on_the_
     T = robot.placement(q, frame)
     world = force.copy()
     world[:, 3:] += np.cross(T[:, :3, 3], force[:, :3])
-    wrenches = {ALIGNED: force, LOCAL: turned(T[:, :3, :3], force), WORLD: world}
-    powers = {
-        reference: np.einsum("ni,ni->n", wrench, robot.velocity(q, v, frame, reference))
-        for reference, wrench in wrenches.items()
-    }
-    torques = {
-        reference: np.einsum("nij,ni->nj", robot.jacobian(q, frame, reference), wrench)
-        for reference, wrench in wrenches.items()
-    }
+    powers, torques = {}, {}
+    for reference, wrench in ((ALIGNED, force), (LOCAL, turned(T[:, :3, :3], force)), (WORLD, world)):
+        powers[reference] = np.einsum("ni,ni->n", wrench, robot.velocity(q, v, frame, reference))
+        torques[reference] = np.einsum("nij,ni->nj", robot.jacobian(q, frame, reference), wrench)
     size = np.abs(world).max() * np.abs(robot.velocity(q, v, frame, WORLD))
     for reference in (LOCAL, WORLD):
         assert close(powers[reference], powers[ALIGNED], size)
@@ -161,7 +156,7 @@ def test_a_moving_base_is_the_same_robot_on_a_floating_root_joint() -> None:
         T = np.tile(np.eye(4), (6, 1, 1))
         T[:, :3, :3], T[:, :3, 3] = R, p
         base = BaseMotion(T, *generator.normal(size=(2, 6, 6)))
-        quaternion = np.array([_quaternion(x) for x in base.placement[:, :3, :3]])
+        quaternion = Rotation.from_matrix(base.placement[:, :3, :3]).as_quat()
         spatial = base.acceleration.copy()
         spatial[:, :3] -= np.cross(base.velocity[:, 3:], base.velocity[:, :3])
         q_free = np.hstack((p, quaternion, q))
@@ -178,11 +173,6 @@ def test_a_moving_base_is_the_same_robot_on_a_floating_root_joint() -> None:
                 assert close(ours, free.jacobian(q_free, frame, reference)[..., 6:])
                 ours = robot.jacobian_rate(q, v, frame, reference, base=base)
                 assert close(ours, free.jacobian_rate(q_free, v_free, frame, reference)[..., 6:])
-
-
-def _quaternion(R: FloatArray) -> FloatArray:
-    quaternion: FloatArray = Rotation.from_matrix(R).as_quat()
-    return quaternion
 
 
 @pytest.mark.parametrize("name", ["panda", "mimic_hand_40_sliding", "followers_of_followers", "tree_8"])
@@ -300,22 +290,17 @@ def assert_converges(error: FloatArray, reach: float, order: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "order", [1, 2], ids=["the Jacobian, of quotients", "the acceleration, of second ones"]
+)
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", NAMES)
-def test_the_jacobian_is_the_limit_of_difference_quotients_of_second_order(name: str, seed: int) -> None:
-    linear, angular, reach = errors(name, seed, order=1)
-    assert_converges(linear, reach, 1)
-    assert_converges(angular, 1.0, 1)
-
-
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("name", NAMES)
-def test_the_acceleration_is_the_limit_of_second_differences_along_constant_rates(
-    name: str, seed: int
+def test_the_jacobian_and_the_acceleration_are_limits_of_differences_of_second_order_along_constant_rates(
+    name: str, seed: int, order: int
 ) -> None:
-    linear, angular, reach = errors(name, seed, order=2)
-    assert_converges(linear, reach, 2)
-    assert_converges(angular, 1.0, 2)
+    linear, angular, reach = errors(name, seed, order)
+    assert_converges(linear, reach, order)
+    assert_converges(angular, 1.0, order)
 
 
 def test_a_jacobian_that_is_slightly_wrong_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
