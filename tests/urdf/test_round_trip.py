@@ -99,13 +99,13 @@ def test_a_name_that_xml_cannot_hold_is_not_written() -> None:
 
 
 def test_an_infinite_effort_makes_the_file_version_1_2() -> None:
-    joint = Joint(
-        "j", JointKind.REVOLUTE, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit=Limit(-1, 1, 2.0, math.inf)
-    )
-    text = to_urdf(build_tree("r", "a", [(joint, "a", "b")]))
+    limit, z = Limit(-1, 1, 2.0, math.inf), np.array([0.0, 0.0, 1.0])
+    joint = Joint("j", JointKind.REVOLUTE, 0, np.eye(4), z, limit=limit)
+    tree = build_tree("r", "a", [(joint, "a", "b")])
+    text = to_urdf(tree)
     assert 'version="1.2"' in text
     assert [f.oracle for f in check_text(text.encode())] == [None]
-    assert_same(tree_of(text.encode()), build_tree("r", "a", [(joint, "a", "b")]))
+    assert_same(tree_of(text.encode()), tree)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-140, 1e140, -3.0])
