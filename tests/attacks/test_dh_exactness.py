@@ -200,7 +200,6 @@ def test_a_clean_table_gets_no_hint_at_snapping(name: str) -> None:
 
 # -- options ---------------------------------------------------------------------------------------
 
-
 IDLE = [
     *(
         f"ur5 {idle} {choice}"

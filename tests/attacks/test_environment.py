@@ -53,7 +53,6 @@ def one_line(text: str) -> str:
 
 # -- standard streams --------------------------------------------------------------------------------------
 
-
 FULL = "standard output: cannot be written: found No space left on device"
 CLOSED = "standard output: cannot be written: found Bad file descriptor"
 #: A line of a shell, its exit code, and what is in the only line of standard error.

@@ -10,6 +10,7 @@ import subprocess
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -194,15 +195,15 @@ def test_a_command_on_a_full_disc_gives_its_result_and_says_so(
 
 @pytest.mark.long
 def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path: Path) -> None:
-    env = {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": ""}
-    process(*BATCH, **env)
+    placement = partial(process, *BATCH, XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR="")
+    placement()
     kernel = min(tmp_path.glob("urdfkin/kernels-*/[!.]*"))
     kernel.write_bytes(flipped(kernel.read_bytes()))
-    done = process(*BATCH, **env)
+    done = placement()
     assert done.code == 0
     (line,) = [line for line in done.err.splitlines() if "damaged" in line]
     assert line.startswith("urdfkin: warning: ")
-    assert "damaged" not in process(*BATCH, **env).err
+    assert "damaged" not in placement().err
 
 
 # -- whose folder ------------------------------------------------------------------------------------------

@@ -127,14 +127,10 @@ def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
 
 
 def test_the_base_of_each_sample_is_its_own() -> None:
-    panda = urdfkin.load("panda")
-    generator = np.random.default_rng(7)
+    panda, generator = urdfkin.load("panda"), np.random.default_rng(7)
     q, v = panda.sample(6, 0).reshape(2, 3, 8), generator.normal(size=(3, 8))
-    base = BaseMotion(
-        at(exp_rotation(generator.normal(size=(2, 1, 3)))),
-        generator.normal(size=(3, 6)),
-        generator.normal(size=6),
-    )
+    T = at(exp_rotation(generator.normal(size=(2, 1, 3))))
+    base = BaseMotion(T, generator.normal(size=(3, 6)), generator.normal(size=6))
     together = panda.acceleration(q, v, v, "panda_hand", base=base, verify="sample")
     for i, j in np.ndindex(2, 3):
         own = BaseMotion(base.placement[i, 0], base.velocity[j], base.acceleration)

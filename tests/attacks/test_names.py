@@ -34,17 +34,15 @@ LIKE_OURS = urdf(
 
 
 def test_an_exact_name_wins_and_a_link_frame_is_that_link() -> None:
-    robot = loaded(LIKE_OURS)
+    foo, other, frame = [1.0, 0.0, 0.0], [1.0, 2.0, 0.0], LinkFrame.of("foo")
+    robot, q = loaded(LIKE_OURS), [0.0, 0.0]
     for base in (None, BaseMotion()):
-        assert robot.placement([0.0, 0.0], "link:foo", base=base)[:3, 3].tolist() == [1.0, 2.0, 0.0]
-        assert robot.placement([0.0, 0.0], "link:link:foo", base=base)[:3, 3].tolist() == [1.0, 2.0, 0.0]
-        assert robot.placement([0.0, 0.0], "foo", base=base)[:3, 3].tolist() == [1.0, 0.0, 0.0]
-        assert robot.placement([0.0, 0.0], LinkFrame.of("foo"), base=base)[:3, 3].tolist() == [1.0, 0.0, 0.0]
+        for name, place in (("link:foo", other), ("link:link:foo", other), ("foo", foo), (frame, foo)):
+            assert robot.placement(q, name, base=base)[:3, 3].tolist() == place
     assert robot.certificate().verified
     robot = loaded(LIKE_OURS)
-    seen = robot.relative_placement([0.0, 0.0], "base", LinkFrame.of("foo"))
-    assert seen[:3, 3].tolist() == [-1.0, 0.0, 0.0]
-    assert robot.relative_placement([0.0, 0.0], "base", "link:foo")[:3, 3].tolist() == [-1.0, -2.0, 0.0]
+    assert robot.relative_placement(q, "base", frame)[:3, 3].tolist() == [-1.0, 0.0, 0.0]
+    assert robot.relative_placement(q, "base", "link:foo")[:3, 3].tolist() == [-1.0, -2.0, 0.0]
     assert robot.certificate().verified
 
 

@@ -71,11 +71,8 @@ def _report(called: Callable[[str], str]) -> str:
     # As wide as each other: it stands beside a plot, whose ticks are as many as there is room for.
     whole["checks"][2] |= {"quantity": "<b>|`\x1b" if called is same else "abcdefghij"}
     failed["worst_case"] |= {"replay": called(NAMES["code"]), "frame": called(NAMES["line"])}
-    document |= {
-        "verdict": "disagrees",
-        "command": called(NAMES["code"]),
-        "started": called(NAMES["end of data"]),
-    }
+    document |= {"verdict": "disagrees", "command": called(NAMES["code"])}
+    document |= {"started": called(NAMES["end of data"])}
     document["versions"] = {key: called(NAMES["script"]) for key in document["versions"]}
     return json.dumps(document)
 
@@ -154,16 +151,10 @@ def test_a_table_in_markdown_has_the_same_elements_under_any_name(kind: str, htm
 
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_name_in_markdown_is_code_and_prose_is_prose(kind: str) -> None:
-    name = NAMES[kind]
-    cell = rendered(f"| a | b |\n| --- | --- |\n| {markdown_code(name)} | x |\n", True)
-    assert [tag for tag, _ in cell.skeleton if tag in ("td", "code", "tr")] == [
-        "tr",
-        "tr",
-        "td",
-        "code",
-        "td",
-    ]
-    prose = rendered(markdown_text(name), True)
+    cell = rendered(f"| a | b |\n| --- | --- |\n| {markdown_code(NAMES[kind])} | x |\n", True)
+    tags = [tag for tag, _ in cell.skeleton if tag in ("td", "code", "tr")]
+    assert tags == ["tr", "tr", "td", "code", "td"]
+    prose = rendered(markdown_text(NAMES[kind]), True)
     assert prose.skeleton == [("p", ()), ("/p", ())]
     assert not re.search(r"@\w|://|www\.|#\d", prose.prose)
 
