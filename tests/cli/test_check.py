@@ -23,16 +23,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 #: A line, its exit code, and how its output begins or, after a star, what is in it.
 LINES = {
-    "good.urdf": (0, "no findings in 1 file\n"),
-    "warned.urdf": (0, "*URDF405"),
+    "good.urdf": (0, "no findings in 1 file\n"), "warned.urdf": (0, "*URDF405"),
     "--strict warned.urdf": (1, "*URDF405 error"),
-    "--ignore URDF402 bad.urdf": (0, "no findings in 1 file\n"),
-    "-": (1, "<stdin>:"),
-    "--format json bad.urdf good.urdf": (1, "*URDF402"),
-    "--format sarif bad.urdf good.urdf": (1, "*URDF402"),
-    "--format github good.urdf": (0, ""),
-    "--max-bytes 10 good.urdf": (1, "*URDF108"),
-}
+    "--ignore URDF402 bad.urdf": (0, "no findings in 1 file\n"), "-": (1, "<stdin>:"),
+    "--format json bad.urdf good.urdf": (1, "*URDF402"), "--format sarif bad.urdf good.urdf": (1, "*URDF402"),
+    "--format github good.urdf": (0, ""), "--max-bytes 10 good.urdf": (1, "*URDF108"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("line", LINES)

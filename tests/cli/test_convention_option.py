@@ -121,7 +121,6 @@ def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
 
 # -- urdfkin order ---------------------------------------------------------------------------------
 
-
 TOOLS = [name for name in BUILT_IN if name != "idyntree"]
 
 

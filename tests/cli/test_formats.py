@@ -21,24 +21,14 @@ from urdfkin.errors.display import CodeLine, Matrix, Strong, Table, TextDocument
 
 #: A command line -> a word of its table, as text and in LaTeX.
 TABLES = {
-    "robots --family arm": "panda",
-    "info elbow": "wrist",
-    "jacobian elbow": "vx",
-    "placement elbow": "x of frame",
-    "hessian elbow": "changed by",
-    "acceleration elbow --v random --breakdown": "Coriolis",
-    "singular-values elbow": "condition",
-    "imu elbow": "proper acceleration",
-    "chain elbow": "revolute",
-    "structure ur5": "axes",
-    "diff ur5 ur5_limited --no-effects": "limit",
-    "same ur5 ur5_limited": "ur5",
-    "calibrate elbow": "identifiable",
-    "screws elbow": "joint",
-    "dh elbow": "joint",
-    "dh elbow --tree": "sigma",
-    "dh ur5 --compare ur5": "exactly",
-}
+    "robots --family arm": "panda", "info elbow": "wrist", "jacobian elbow": "vx",
+    "placement elbow": "x of frame", "hessian elbow": "changed by",
+    "acceleration elbow --v random --breakdown": "Coriolis", "singular-values elbow": "condition",
+    "imu elbow": "proper acceleration", "chain elbow": "revolute", "structure ur5": "axes",
+    "diff ur5 ur5_limited --no-effects": "limit", "same ur5 ur5_limited": "ur5",
+    "calibrate elbow": "identifiable", "screws elbow": "joint", "dh elbow": "joint",
+    "dh elbow --tree": "sigma", "dh ur5 --compare ur5": "exactly",
+}  # fmt: skip
 
 
 def written(line: str, form: str) -> str:
@@ -110,7 +100,6 @@ def test_a_document_has_matrices_code_and_emphasis_in_every_format() -> None:
 
 
 # -- suffixes --------------------------------------------------------------------------------------
-
 
 ELBOW = str(Path(__file__).parents[2] / "robots" / "elbow.urdf")
 WORDS = ("jacobian", "elbow", "--q", "random:2")
@@ -227,7 +216,7 @@ def test_a_disc_that_is_full_while_writing_leaves_nothing(
 
     def made(*words: Any, **how: Any) -> Any:
         stream = right(*words, **how)
-        stream.write = full  # type: ignore[assignment]
+        stream.write = full  # type: ignore[method-assign]
         return stream
 
     monkeypatch.setattr(tempfile, "NamedTemporaryFile", made)

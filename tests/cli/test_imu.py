@@ -25,7 +25,8 @@ def test_a_csv_file_and_an_archive_of_the_same_motion_give_the_librarys_numbers(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
     robot = library.load("ur5")
-    expected = robot.imu(*(motion[x] for x in "qva"), "tool0", gravity=[0.0, 1.0, -9.8])
+    q, v, a = (motion[x] for x in "qva")
+    expected = robot.imu(q, v, a, "tool0", gravity=[0.0, 1.0, -9.8])
     np.savez(tmp_path / "log.npz", **motion)  # type: ignore[arg-type]
     write(tmp_path / "log.csv", robot, motion)
     for log in ("log.csv", "log.npz"):
@@ -48,7 +49,8 @@ def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_ar
     fields = {f"base_{name}": getattr(base, name) for name in ("placement", "velocity", "acceleration")}
     np.savez(path, **motion, **fields)  # type: ignore[arg-type]
     words = ["imu ur5 --frame tool0 --format json --trajectory", str(path)]
-    expected = library.load("ur5").imu(*(motion[x] for x in "qva"), "tool0", base=base)
+    q, v, a = (motion[x] for x in "qva")
+    expected = library.load("ur5").imu(q, v, a, "tool0", base=base)
     assert urdfkin(*words).data["result"] == expected.tolist()
     np.savez(path, q=motion["q"])
     assert "rates by central differences" in good(*words).err

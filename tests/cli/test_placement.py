@@ -154,7 +154,6 @@ def test_a_batch_of_bases_goes_with_one_configuration_and_with_as_many(tmp_path:
 
 # -- the parts of an acceleration, and the rate of the Jacobian ------------------------------------
 
-
 POLAR = ["polar", "--q", "0.3,0.7", "--v", "1,2", "--a", "0.5,-1"]
 KINDS = ["transverse", "centripetal", "coriolis", "sliding"]
 

@@ -340,7 +340,6 @@ def test_every_command_with_one_robot_can_lock_joints(line: str) -> None:
 
 # -- by name, in degrees, as a pose ----------------------------------------------------------------
 
-
 NAMED = "panda_joint1=30deg,panda_joint4=-pi/2,panda_joint6=1.5"
 RADIANS = [math.pi / 6, -0.785398, 0.0, -math.pi / 2, 0.0, 1.5, 0.785398, 0.001]
 

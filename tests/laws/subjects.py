@@ -12,14 +12,9 @@ from urdfkin.robot import Robot
 EPS = np.finfo(np.float64).eps
 
 NAMES = (
-    "panda",
-    "a1",
-    "floating_root",
-    "planar_and_floating_in_the_middle",
-    "mimic_hand_40_sliding",
-    "tree_3",
+    "panda", "a1", "floating_root", "planar_and_floating_in_the_middle", "mimic_hand_40_sliding", "tree_3",
     "tree_8",
-)
+)  # fmt: skip
 
 
 def robot_of(name: str, *, mimic: bool | None = None, root_joint: str | None = None) -> Robot:

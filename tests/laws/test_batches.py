@@ -347,7 +347,6 @@ def test_a_breakdown_whose_part_overflows_says_in_which_samples() -> None:
 
 # -- a configuration has the same result, to the last bit, alone, prepared, and as any row of a batch --------
 
-
 #: Rows of a block, of the next, and of one that was filled up.
 SAMPLES = 2 * LANES + 3
 ROWS = (0, 7, 8, LANES - 1, LANES, 2 * LANES, SAMPLES - 1)

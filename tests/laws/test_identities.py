@@ -55,19 +55,6 @@ def test_the_velocity_is_the_jacobian_times_the_rates(robot: Robot, reference: R
         assert close(np.einsum("nij,nj->ni", J, v), velocity, J)
 
 
-@pytest.mark.parametrize("reference", list(Reference))
-def test_j_a_plus_j_dot_v_is_the_acceleration(robot: Robot, reference: Reference) -> None:
-    # In LOCAL and WORLD it is the spatial acceleration, from which the classical one differs by w x vel.
-    q, v, a = state(robot, 17, 2)
-    for frame in frames(robot):
-        J, J_dot = robot.jacobian(q, frame, reference), robot.jacobian_rate(q, v, frame, reference)
-        total = np.einsum("nij,nj->ni", J, a) + np.einsum("nij,nj->ni", J_dot, v)
-        if reference is not ALIGNED:
-            velocity = robot.velocity(q, v, frame, reference)
-            total[:, :3] += np.cross(velocity[:, 3:], velocity[:, :3])
-        assert close(total, robot.acceleration(q, v, a, frame, reference), J, J_dot)
-
-
 def test_references_are_related_by_the_motion_of_a_rigid_body(robot: Robot) -> None:
     q, v, a = state(robot, 17, 3)
     for frame in frames(robot):
@@ -248,7 +235,6 @@ def test_the_jacobian_and_its_rate_make_the_acceleration(name: str) -> None:
 
 # -- the Jacobian and the acceleration are derivatives of the placement: a study of the step size ------------
 
-
 STEPS = 2.0 ** -np.arange(3.0, 26.0)
 
 
@@ -310,7 +296,6 @@ def test_a_jacobian_that_is_slightly_wrong_does_not_pass(monkeypatch: pytest.Mon
 
 
 # -- a placement in another frame: how such placements compose, and how they are held ------------------------
-
 
 #: Frames of one branch and of two, up the tree, down and across; a base that moves by itself, a follower.
 TRIPLES = {

@@ -81,20 +81,6 @@ def one_joint(joint: str) -> str:
     )
 
 
-def test_a_hinge_turns_about_its_anchor() -> None:
-    robot = loaded(one_joint('<joint name="j" axis="0 0 1" pos="0 2 0"/>'))
-    T = robot.placement([math.pi], "b")
-    assert T[:3, 3] == pytest.approx([1.0, 4.0, 0.0])  # half a turn about (1, 2, 0)
-    assert T[:3, :3] == pytest.approx(np.diag([-1.0, -1.0, 1.0]))
-
-
-def test_a_reference_value_is_where_the_file_draws_the_body() -> None:
-    turning = loaded(one_joint('<joint name="j" axis="0 0 1" pos="0 2 0" ref="0.5"/>'))
-    assert turning.placement([0.5], "b")[:3, 3] == pytest.approx([1.0, 0.0, 0.0])
-    sliding = loaded(one_joint('<joint name="j" type="slide" axis="0 0 1" ref="0.5" range="0 1"/>'))
-    assert sliding.placement([0.75], "b")[:3, 3] == pytest.approx([1.0, 0.0, 0.25])
-
-
 def test_joints_of_one_body_move_one_after_the_other() -> None:
     robot = loaded(
         one_joint('<joint name="x" type="slide" axis="1 0 0" range="-9 9"/><joint name="turn" axis="0 0 1"/>')

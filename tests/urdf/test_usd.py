@@ -494,8 +494,7 @@ def equality(coefficient: int) -> str:
 LISTED: dict[str, tuple[str, list[tuple[str, ...]]]] = {
     "a joint that closes a loop": (LINKS + JOINTS + CLOSING, [("USD101", "/arm/closing")]),
     "a joint outside the articulation": (
-        LINKS + JOINTS + CLOSING.replace("\n}", f"\n{OUTSIDE}\n}}"),
-        [("USD101", "/arm/closing")],
+        LINKS + JOINTS + CLOSING.replace("\n}", f"\n{OUTSIDE}\n}}"), [("USD101", "/arm/closing")],
     ),
     "a disabled joint": (
         LINKS + JOINTS + joint("off", "Fixed", "upper", "lower", "bool physics:jointEnabled = false"),
@@ -522,9 +521,7 @@ LISTED: dict[str, tuple[str, list[tuple[str, ...]]]] = {
             [("USD101", "/arm/rail", f"urdfkin does not read {schemas}")],
         )
         for schemas in (
-            "MjcEqualityJointAPI",
-            "PhysxTendonAxisAPI:t",
-            "OtherMimicAPI",
+            "MjcEqualityJointAPI", "PhysxTendonAxisAPI:t", "OtherMimicAPI",
             "OtherMimicAPI, PhysxTendonAxisAPI:u",
         )
     },
@@ -534,8 +531,7 @@ LISTED: dict[str, tuple[str, list[tuple[str, ...]]]] = {
         LINKS + JOINTS + joint("weld", "Fixed", "lower", "base", OUTSIDE, '"MjcEqualityWeldAPI"'),
         [
             (
-                "USD101",
-                "/arm/weld",
+                "USD101", "/arm/weld",
                 "a tree cannot represent this FixedJoint, which is outside the articulation",
             )
         ],
@@ -544,7 +540,7 @@ LISTED: dict[str, tuple[str, list[tuple[str, ...]]]] = {
         LINKS + JOINTS + CROWD % 'def Cube "one" {\n}\n',
         [("USD102", "/arm/crowd", "kinematics does not use this PointInstancer")],
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("content", "expected"), LISTED.values(), ids=LISTED)
@@ -691,16 +687,12 @@ def test_text_that_is_no_usd_is_an_error(write: Write, text: str) -> None:
 @pytest.mark.parametrize(
     ("reference", "why"),
     [
-        ("../../secret.usda", "outside"),
-        ("/etc/passwd.usda", "outside"),
-        ("https://example.org/a.usda", "fetches nothing"),
-        ("omniverse://host/a.usda", "fetches nothing"),
-        ("./link.usda", "outside"),
-        ("./.hidden/a.usda", "outside"),
-        ("./notes.txt", "not USD"),
+        ("../../secret.usda", "outside"), ("/etc/passwd.usda", "outside"),
+        ("https://example.org/a.usda", "fetches nothing"), ("omniverse://host/a.usda", "fetches nothing"),
+        ("./link.usda", "outside"), ("./.hidden/a.usda", "outside"), ("./notes.txt", "not USD"),
         ('`"./${X}.usda"`', "expression"),
     ],
-)
+)  # fmt: skip
 @pytest.mark.parametrize("arc", ["sublayer", "reference", "payload", "variant"])
 def test_a_reference_outside_the_folder_is_refused(
     write: Write, tmp_path: Path, reference: str, why: str, arc: str
@@ -985,10 +977,10 @@ def _joint_in_usd(tree: KinematicTree, k: int, spell: Callable[[str], str], slip
     one = tree.joints[k]
     R = _with_first_axis(-one.axis if slip == "axis sign" else one.axis)
     A, B = one.T_parent_joint @ pose(R), pose(R)
-    A[:3, 3] *= {"centimetres": 100.0, "mirrored frame": np.array([1.0, -1.0, 1.0])}.get(slip, 1.0)
+    A[:3, 3] *= {"centimetres": [100.0] * 3, "mirrored frame": [1.0, -1.0, 1.0]}.get(slip, [1.0] * 3)
     A = A @ _MOVED.get(slip, np.eye(4))
     B = B @ _MOVED[slip] if slip == "other frames on the axis" else B
-    frames = {f"localPos{i}": _point(T) for i, T in enumerate((A, B))}
+    frames: dict[str, Any] = {f"localPos{i}": _point(T) for i, T in enumerate((A, B))}
     frames |= {f"localRot{i}": _quaternion(T) for i, T in enumerate((A, B))}
     ends = [spell(tree.links[one.parent]), spell(tree.links[k + 1])]
     degrees = 180.0 / math.pi if one.kind.turns else 1.0
@@ -1178,13 +1170,9 @@ def test_a_certificate_up_to_single_precision_is_rechecked(write: Write) -> None
 
 
 SLIPS = {
-    "axis sign": "senses",
-    "centimetres": "USD304",
-    "radians": "USD303",
-    "mimic dropped": "independent joint in B",
-    "exchanged bodies": "USD304",
-    "mirrored frame": "USD304",
-}
+    "axis sign": "senses", "centimetres": "USD304", "radians": "USD303",
+    "mimic dropped": "independent joint in B", "exchanged bodies": "USD304", "mirrored frame": "USD304",
+}  # fmt: skip
 
 
 def with_mimic(robot: urdfkin.Robot) -> urdfkin.Robot:
@@ -1375,7 +1363,7 @@ def test_newtons_importer_and_kinematics_place_the_links_alike(write: Write, up:
 
 def turn(name: str, first: str, second: str, place: Sequence[float], rotation: object = (1, 0, 0, 0)) -> str:
     """Write a joint about z whose frames are written in full."""
-    frames = {"localPos0": tuple(place), "localPos1": (0, 0, 0), "localRot0": rotation}
+    frames: dict[str, Any] = {"localPos0": tuple(place), "localPos1": (0, 0, 0), "localRot0": rotation}
     return joint(name, "Revolute", first, second, axis="Z", **frames, localRot1=(1, 0, 0, 0))
 
 

@@ -164,7 +164,6 @@ def test_a_robot_is_told_a_handful_of_things_at_most() -> None:
 
 # -- what a comment silences is not warned of; what it cannot change stays as it is --------------------------
 
-
 COMMENT = "<!-- urdfkin: ignore[{}] as drawn -->\n"
 
 

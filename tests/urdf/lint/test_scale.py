@@ -57,13 +57,10 @@ def test_50000_unknown_links_do_not_search_for_suggestions_forever() -> None:
 @pytest.mark.parametrize(
     ("limits", "code"),
     [
-        (Limits(bytes=10), "URDF108"),
-        (Limits(elements=1), "URDF114"),
-        (Limits(depth=1), "URDF115"),
-        (Limits(attributes=0), "URDF116"),
-        (Limits(name=2), "URDF117"),
+        (Limits(bytes=10), "URDF108"), (Limits(elements=1), "URDF114"), (Limits(depth=1), "URDF115"),
+        (Limits(attributes=0), "URDF116"), (Limits(name=2), "URDF117"),
     ],
-)
+)  # fmt: skip
 def test_each_limit_refuses_and_says_how_to_raise_it(limits: Limits, code: str) -> None:
     (finding,) = check_text(b'<robot name="r"><link name="a"/></robot>', limits=limits)
     assert finding.code == code

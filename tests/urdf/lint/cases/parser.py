@@ -11,25 +11,13 @@ _ENTITY = '<!DOCTYPE r [<!ENTITY % p SYSTEM "file:///etc/passwd">%p;]>'
 _UTF16 = _PLAIN.replace("<?xml", '<?xml encoding="UTF-16"').encode("utf-16")
 
 _BAD = {
-    "infinity": "inf 0 0",
-    "negative-infinity": "-Infinity 0 0",
-    "overflow": "1e400 0 0",
-    "comma-decimal": "0,5 0 0",
-    "commas": "0,0,1",
-    "underscore": "1_0 0 0",
-    "plus-plus": "++1 0 0",
-    "no-mantissa": "e5 0 0",
-    "no-exponent": "1e 0 0",
-    "only-a-point": ". 0 0",
-    "octal": "0o7 0 0",
-    "fraction": "1/2 0 0",
-    "expression": "pi/2 0 0",
-    "wide-digits": "\uff11 0 0",
-    "unicode-minus": "\u22121 0 0",
-    "no-break-space": "0\u00a00 1",
-    "unit": "100mm 0 0",
+    "infinity": "inf 0 0", "negative-infinity": "-Infinity 0 0", "overflow": "1e400 0 0",
+    "comma-decimal": "0,5 0 0", "commas": "0,0,1", "underscore": "1_0 0 0", "plus-plus": "++1 0 0",
+    "no-mantissa": "e5 0 0", "no-exponent": "1e 0 0", "only-a-point": ". 0 0", "octal": "0o7 0 0",
+    "fraction": "1/2 0 0", "expression": "pi/2 0 0", "wide-digits": "\uff11 0 0",
+    "unicode-minus": "\u22121 0 0", "no-break-space": "0\u00a00 1", "unit": "100mm 0 0",
     "hex-float": "0x1p-3 0 0",
-}
+}  # fmt: skip
 
 _NEW = 'name="r" version="1.2"'
 
