@@ -7,7 +7,6 @@ import ast
 import io
 import os
 import resource
-import subprocess
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ import pytest
 import urdfkin
 from tests.cli.running import refused
 from tests.cli.running import urdfkin as command
+from tests.cli.test_check_in_a_repository import commit, git, put
 from urdfkin.errors import SourceError
 from urdfkin.robot.trajectory import read_arrays
 from urdfkin.system import files
@@ -234,19 +234,15 @@ def test_a_xacro_argument_without_a_name_and_a_value_is_refused(word: str, tmp_p
 def test_an_older_version_that_is_too_large_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def git(*words: str) -> None:
-        who = ("-c", "user.name=a", "-c", "user.email=a@b")
-        subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
-
-    git("init", "-b", "main")
-    (tmp_path / "arm.urdf").write_text("<robot/>" + " " * 1000)
-    git("add", "arm.urdf")
-    git("commit", "-m", "a")
+    monkeypatch.chdir(tmp_path)
+    git("init", "-q", "-b", "main")
+    arm = tmp_path / put("arm.urdf", "<robot/>" + " " * 1000)
+    commit()
     version = version_before("main", tmp_path)
-    assert version.read(tmp_path / "arm.urdf") is not None
+    assert version.read(arm) is not None
     monkeypatch.setattr("urdfkin.system.git.MOST", 1000)
     with pytest.raises(SourceError, match=r"arm\.urdf: too large in the older version: found 1008 bytes"):
-        version.read(tmp_path / "arm.urdf")
+        version.read(arm)
 
 
 # -- folders and meshes ---------------------------------------------------------------------------------
