@@ -122,8 +122,7 @@ def test_near_the_singularity_it_is_verified_and_the_bound_grows(free: Robot, na
             assert distance < 1e-12
         # Nobody is told that this was checked.
         assert np.isfinite(free.analytical_jacobian(q, "body", name, nearest=0.0, verify=False)).all()
-    line = next(x for x in free.certificate().lines if x.quantity == "analytical jacobian")
-    assert line.share < 0.5
+    assert next(x for x in free.certificate().lines if x.quantity == "analytical jacobian").share < 0.5
 
 
 @pytest.mark.parametrize("name", ["ZYZ", "xyz"])

@@ -72,8 +72,7 @@ def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
 def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cell: str) -> None:
     path = ur5()
     table = dh_table(urdfkin.load("ur5").tree, "tool0", "base", convention, snap=1e-6)
-    right = compare(path, table, fit=False)
-    assert right.agrees
+    assert compare(path, table, fit=False).agrees
     wrong = with_cell(table, row, **{cell: getattr(table.rows[row], cell) + 3e-3})
     found = compare(path, wrong, fit=False)
     assert not found.agrees
@@ -147,8 +146,7 @@ def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name:
 
 
 def test_cells_come_in_the_order_of_their_effect() -> None:
-    robot = urdfkin.load("ur5")
-    table = dh_table(calibrated(robot.tree, 1), "tool0", "base")
+    table = dh_table(calibrated(urdfkin.load("ur5").tree, 1), "tool0", "base")
     effects = [one.tip for one in compare(ur5(), table).differences]
     assert len(effects) > 5
     assert effects == sorted(effects, reverse=True)

@@ -113,8 +113,7 @@ def test_a_right_table_of_a_rack_and_pinion_is_right_whatever_the_multiplier(
 ) -> None:
     found = urdfkin.load(rack(multiplier))
     for convention in ("standard", "modified"):
-        check = checked(found, found.dh(*ends, convention))
-        assert check.within
+        assert checked(found, found.dh(*ends, convention)).within
 
 
 @pytest.mark.parametrize("multiplier", [30, 1000])
@@ -175,8 +174,7 @@ def test_a_tilt_that_is_no_rounding_is_kept(tilt: float) -> None:
     table = dh_table(tree, "tip", "l0")
     assert table.has_hayati_rows
     q = np.random.default_rng(0).uniform(-3, 3, (50, 4))
-    error = np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max()
-    assert error <= 20 * EPS
+    assert np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max() <= 20 * EPS
 
 
 @pytest.mark.slow
@@ -185,11 +183,9 @@ def test_so101_has_no_foot_at_the_inverse_of_rounding_and_baxter_is_told_to_snap
     table = robot.dh(near_parallel="strict")
     assert checked(robot, table).within
     assert max(abs(row.d) for row in table.rows) < 1.0
-    done = good("dh baxter")
-    hint = next(line for line in done.text.splitlines() if line.startswith("hint: "))
+    hint = next(line for line in good("dh baxter").text.splitlines() if line.startswith("hint: "))
     assert "--snap 1e-11" in hint
-    snapped = urdfkin.load("baxter").dh(snap=1e-11)
-    assert noisy_cells(snapped) == []
+    assert noisy_cells(urdfkin.load("baxter").dh(snap=1e-11)) == []
     assert "--snap" not in command("dh baxter --snap 1e-11").text
 
 
@@ -292,8 +288,7 @@ def test_three_digits_are_said_to_lose_nearly_a_millimetre(form: str, units: tup
 
 
 def test_latex_says_it_on_stderr_and_the_whole_tree_as_well() -> None:
-    done = command("dh ur10 --base base --tip tool0 --digits 3 --format latex")
-    measured, _ = lost(done.err)
+    measured, _ = lost(command("dh ur10 --base base --tip tool0 --digits 3 --format latex").err)
     assert measured > 5e-4
     text = command("dh ur10 --tree --digits 3").text
     assert "printed with 3 digits" in text

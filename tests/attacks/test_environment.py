@@ -91,8 +91,7 @@ def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(word
 @pytest.mark.parametrize("columns", ["", "abc", "0", "-5", "1_0", "1e3", "9999", "7", "1"])
 def test_any_columns_give_a_table(columns: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", columns)
-    done = running.good("info ur5")
-    assert "shoulder_pan_joint" in "".join(done.text.split())
+    assert "shoulder_pan_joint" in "".join(running.good("info ur5").text.split())
 
 
 ASCII = (

@@ -87,8 +87,7 @@ def test_no_kernel_fuses_the_multiplication_and_the_addition() -> None:
         m, c = rng.normal(size=2).tolist()
         robot = urdfkin.load(text((m, c)), verify=False)
         q = rng.uniform(-1e9, 1e9, (64, 1))
-        free = freed(robot.tree)
-        alone = placements(compile_tree(free, [2]), np.hstack((q, m * q + c)))[:, 0]
+        alone = placements(compile_tree(freed(robot.tree), [2]), np.hstack((q, m * q + c)))[:, 0]
         np.testing.assert_array_equal(robot.placement(q, "l2"), alone)
         np.testing.assert_array_equal(robot.prepare("l2").placement(q[0]), alone[0])
 
@@ -215,8 +214,7 @@ def test_a_leader_stays_where_its_follower_keeps_its_limits(
     drawn = robot.sample(2000)
     assert robot.limit_violations(drawn) == []
     reached = np.ptp(drawn)
-    wanted = min(1.1 / abs(multiplier), 2.0)
-    assert reached >= 0.4 * wanted, "the range that is left is used"
+    assert reached >= 0.4 * min(1.1 / abs(multiplier), 2.0), "the range that is left is used"
 
 
 def test_a_validation_covers_the_files_limits_and_a_continuous_leader_any_angle() -> None:

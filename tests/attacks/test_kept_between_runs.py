@@ -240,8 +240,7 @@ def test_a_folder_of_ones_own_is_closed_to_others_and_may_be_of_a_group_of_ones_
 
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o702])
 def test_a_folder_that_everybody_may_write_in_is_refused(mode: int, tmp_path: Path) -> None:
-    folder = made(tmp_path)
-    folder.chmod(mode)
+    made(tmp_path).chmod(mode)
     refused(tmp_path, r"every user can write to .*chmod go-w.* and delete")
 
 

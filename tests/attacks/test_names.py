@@ -65,8 +65,7 @@ def test_a_prepared_frame_is_not_taken_for_another_of_its_text() -> None:
     ways = "link:foo", LinkFrame.of("foo"), "link:foo"
     assert [robot.prepare(frame).placement(q)[1, 3] for frame in ways] == [2.0, 0.0, 2.0]
     assert [robot.placement(q, frame, verify=False)[1, 3] for frame in ways] == [2.0, 0.0, 2.0]
-    again = pickle.loads(pickle.dumps(robot.prepare(LinkFrame.of("foo"))))
-    assert again.placement(q)[1, 3] == 0.0
+    assert pickle.loads(pickle.dumps(robot.prepare(LinkFrame.of("foo")))).placement(q)[1, 3] == 0.0
 
 
 def test_every_frame_of_all_frames_stands_for_itself_also_in_a_validation() -> None:
@@ -76,8 +75,7 @@ def test_every_frame_of_all_frames_stands_for_itself_also_in_a_validation() -> N
     for copied in (copy.deepcopy(robot.all_frames), pickle.loads(pickle.dumps(robot.all_frames))):
         assert [robot.tree.frame_link(frame) for frame in copied] == [0, 1, 2, 1, 2]
     assert urdfkin.validate([LIKE_OURS.encode()], samples=2).passed
-    lines = judge(loaded(LIKE_OURS), samples=1).lines
-    assert max(line.pinocchio.worst for line in lines) < 10.0
+    assert max(line.pinocchio.worst for line in judge(loaded(LIKE_OURS), samples=1).lines) < 10.0
 
 
 @pytest.mark.parametrize("name", ["anymal_c", "so100", "z1", "b1_z1"])

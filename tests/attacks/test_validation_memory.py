@@ -137,8 +137,7 @@ def test_what_a_robot_needs_grows_with_the_cube_of_its_rates_and_with_its_links(
     needs = [memory.needed(tree, 28) for tree in trees]
     assert needs[1] - needs[0] >= 64 * (200**3 - 100**3)
     assert needs[0] == 64 * 100**3 + 24_000 * 101 + 12 * min(32 * 2**20, 2 * 101 * 28 * 8 * 600)
-    alone = urdfkin.load(chain(0, "fixed")).tree
-    assert memory.needed(alone, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
+    assert memory.needed(urdfkin.load(chain(0, "fixed")).tree, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
     wide = urdfkin.load(chain(100, "revolute", leaves=1000)).tree
     assert memory.needed(wide, 28) > needs[0] + 1000 * 16_000
     memory.demand(trees[0], 28, needs[0])

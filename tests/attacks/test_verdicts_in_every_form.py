@@ -166,8 +166,7 @@ def test_junit_tells_a_failure_from_an_error(monkeypatch: pytest.MonkeyPatch) ->
         ("refused", "failure", "not verified"),
         ("bad input", "error", "bad input"),
     ):
-        root = read(CASES[name][0](monkeypatch))
-        case = root.xpath("//testcase[@name='verdict']")
+        case = read(CASES[name][0](monkeypatch)).xpath("//testcase[@name='verdict']")
         assert isinstance(case, list)
         assert isinstance(case[0], etree._Element)
         (outcome,) = case[0]

@@ -29,8 +29,7 @@ def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
     assert done.data["rank"] == 14
     assert sum(one["fitted"] for one in done.data["parameters"]) == 14
     assert done.data["rms"]["after"]["metres"] < 1e-14
-    T = load(out).placement(true.q, "hand")
-    assert np.abs(T - true.T).max() < 1e-13
+    assert np.abs(load(out).placement(true.q, "hand") - true.T).max() < 1e-13
     assert "measured on the bench" in out.read_text()
     shown = urdfkin(*words)
     assert "14 of 18 parameters identifiable, 4 fixed" in shown.text

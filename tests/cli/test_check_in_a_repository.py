@@ -515,8 +515,7 @@ def test_fixes_that_turn_a_joint_wait_for_unsafe_fixes(here: Path) -> None:
         "--unsafe-fixes also fixes 1 finding, but rotates joints by more than a rounding error"
         in check().text
     )
-    done = check("--diff")
-    assert done.err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
+    assert check("--diff").err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
     check("--fix")
     assert arm.read_text() == text.replace("0 0 2", "0 0 1")
     assert "--unsafe-fixes does nothing without --fix and --diff" in check("--unsafe-fixes").err

@@ -115,8 +115,7 @@ def test_octave_is_told_the_functions_name_and_never_the_files(
     )
     octave.chmod(0o700)
     monkeypatch.setenv("PATH", f"{octave.parent}:{os.environ['PATH']}")
-    text = urdfkin("export planar_two_link --to matlab --quantity placement").text
-    path.write_text(text, "utf-8")
+    path.write_text(urdfkin("export planar_two_link --to matlab --quantity placement").text, "utf-8")
     assert urdfkin("export --check", str(path)).code == 0
     assert (tmp_path / "said").read_text().splitlines()[-1] == "planar_two_link_tip_kinematics().check();"
     assert (tmp_path / "there").read_text() == "planar_two_link_tip_kinematics.m\n"

@@ -47,8 +47,7 @@ def test_the_help_page_has_every_command_the_version_pinocchios_and_the_families
     group = click.Context(cli)
     for name in commands():
         assert isinstance(cli.get_command(group, name), click.Command)
-    done = good("--version")
-    assert done.text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
+    assert good("--version").text.strip().endswith(f"Pinocchio {metadata.version('pin')}")
     page = " ".join(urdfkin("robots --help").text.split())
     named = page.partition("Show only the robots of one family: ")[2].partition(".")[0].split(", ")
     assert named == sorted({entry.family for entry in catalogue().values()})
@@ -106,8 +105,7 @@ def test_the_examples_of_validation_run_one_after_the_other(
 def test_help_imports_nothing_heavy_of_any_command() -> None:
     for words in ("import urdfkin", "import urdfkin.cli", "from urdfkin.cli import cli; cli.get_help"):
         code = f"import sys; {words}; print(sorted({HEAVY!r} & set(sys.modules)))"
-        done = python(code)
-        assert done.stdout == "[]\n"
+        assert python(code).stdout == "[]\n"
     assert imported(["--help", *(f"{command} --help" for command in commands())], HEAVY) == {}
 
 

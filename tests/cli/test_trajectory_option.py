@@ -195,8 +195,7 @@ def test_a_placement_needs_no_time_and_keeps_the_angles_of_the_file(tmp_path: Pa
 def test_velocities_of_the_file_are_used_and_what_is_computed_is_said(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
-    robot = urdfkin.load("panda")
-    path = write(tmp_path / "log.csv", robot, {x: motion[x] for x in "tqv"})
+    path = write(tmp_path / "log.csv", urdfkin.load("panda"), {x: motion[x] for x in "tqv"})
     words = ("panda", "--frame", "panda_hand", "--trajectory", str(path))
     velocity = run("velocity", *words, "--format", "json")
     assert velocity.data["v"] == motion["v"].tolist()

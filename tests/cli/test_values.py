@@ -48,8 +48,7 @@ def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_json_csv_and_npy_give_the_librarys_numbers_to_the_last_digit(quantity: str, n: int) -> None:
     result = expected(quantity, n, "local")
-    data = json.loads(command(quantity, n, "local", "json"))
-    assert np.array_equal(np.array(data["result"]), result)
+    assert np.array_equal(np.array(json.loads(command(quantity, n, "local", "json"))["result"]), result)
     assert np.array_equal(np.load(io.BytesIO(command(quantity, n, "local", "npy"))), result)
     rows = list(csv.reader(io.StringIO(command(quantity, n, "local", "csv").decode())))
     numbers = np.array([[float(cell) for cell in row if _is_number(cell)] for row in rows[1:]])
@@ -224,8 +223,7 @@ def test_output_goes_to_a_file_whole_through_a_link_or_to_a_device_and_the_check
     assert target.read_text().startswith("sample,row,panda_joint1")
     assert urdfkin("jacobian panda --format csv -o /dev/null").code == 0
     assert Path("/dev/null").is_char_device()
-    dash = urdfkin("jacobian panda --format csv -o -")
-    assert dash.text.startswith("sample,row,panda_joint1")
+    assert urdfkin("jacobian panda --format csv -o -").text.startswith("sample,row,panda_joint1")
 
 
 def test_the_default_frame_is_the_catalogues_tip_limits_are_warned_of_and_mimic_joints_follow_as_asked() -> (

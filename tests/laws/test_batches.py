@@ -55,8 +55,7 @@ def test_a_batch_equals_a_loop_over_its_samples(robot: Robot, quantity: str) -> 
     compute = QUANTITIES[quantity]
     q, v, a = state(robot, 39, 1)
     batch = compute(robot, q, v, a)
-    loop = np.array([compute(robot, *row) for row in zip(q, v, a, strict=True)])
-    assert not differing(batch, loop)
+    assert not differing(batch, np.array([compute(robot, *row) for row in zip(q, v, a, strict=True)]))
 
 
 @pytest.mark.parametrize("shape", [(), (1,), (0,), (5,), (16,), (2, 0, 3), (2, 3), (1, 4, 1, 5)])
@@ -64,8 +63,7 @@ def test_a_batch_equals_a_loop_over_its_samples(robot: Robot, quantity: str) -> 
 def test_any_leading_shape_comes_back(quantity: str, shape: tuple[int, ...]) -> None:
     robot = robot_of("tree_3")
     compute = QUANTITIES[quantity]
-    n = int(np.prod(shape))
-    q, v, a = state(robot, n, 2)
+    q, v, a = state(robot, int(np.prod(shape)), 2)
     flat = compute(robot, q, v, a)
     shaped = compute(robot, *(x.reshape(*shape, x.shape[1]) for x in (q, v, a)))
     assert not differing(shaped, flat.reshape(*shape, *flat.shape[1:]))
@@ -121,8 +119,7 @@ def test_inputs_are_left_as_they_were_and_results_belong_to_the_caller() -> None
     robot = load("ur5")
     q = robot.sample(4, 5)
     before = q.copy()
-    first = robot.jacobian(q, "tool0")
-    first[...] = 7.0
+    robot.jacobian(q, "tool0")[...] = 7.0
     assert (q == before).all()
     assert not (robot.jacobian(q, "tool0") == 7.0).any()
 
@@ -434,8 +431,7 @@ def test_planar_floating_and_following_joints(floating: bool) -> None:
 def test_each_tip_of_a_tree_though_it_needs_only_some_of_the_coordinates(branches: int, joints: int) -> None:
     robot = broom(branches, joints)
     for leaf in robot.tree.leaves():
-        frame = robot.tree.frame_name(leaf)
-        assert list(faults(robot, frame, *state(robot, LANES + 1, 4))) == []
+        assert list(faults(robot, robot.tree.frame_name(leaf), *state(robot, LANES + 1, 4))) == []
 
 
 @pytest.mark.slow

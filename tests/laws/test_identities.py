@@ -71,8 +71,7 @@ def test_references_are_related_by_the_motion_of_a_rigid_body(robot: Robot) -> N
         assert close(at_origin, robot.acceleration(q, v, a, frame, WORLD))
         assert close(turned(R, velocity), robot.velocity(q, v, frame, LOCAL))
         assert close(turned(R, acceleration), robot.acceleration(q, v, a, frame, LOCAL))
-        J = robot.jacobian(q, frame)
-        columns = np.moveaxis(J, -1, 1)
+        columns = np.moveaxis(robot.jacobian(q, frame), -1, 1)
         assert close(turned(R[:, None], columns), np.moveaxis(robot.jacobian(q, frame, LOCAL), -1, 1))
         shifted = columns.copy()
         shifted[..., :3] += np.cross(columns[..., 3:], d[:, None])
@@ -252,8 +251,7 @@ def errors(name: str, seed: int, order: int) -> tuple[FloatArray, FloatArray, fl
     acceleration = robot.acceleration(q, v, np.zeros_like(a), frame)
     linear = (after[:, :3, 3] - 2.0 * now[:3, 3] + before[:, :3, 3]) / h**2 - acceleration[:3]
     forth = rotation_vector(after[:, :3, :3] @ now[:3, :3].T)
-    back = rotation_vector(before[:, :3, :3] @ now[:3, :3].T)
-    turn = (forth + back) / h**2 - acceleration[3:]
+    turn = (forth + rotation_vector(before[:, :3, :3] @ now[:3, :3].T)) / h**2 - acceleration[3:]
     return np.abs(linear).max(axis=1), np.abs(turn).max(axis=1), reach
 
 
@@ -319,8 +317,7 @@ def test_neighbours_cancel_and_the_way_back_is_the_inverse(
     )
     np.testing.assert_allclose(T_a_b @ T_b_c, T_a_c, atol=1e-14)
     np.testing.assert_allclose(T_a_b @ T_b_a, np.broadcast_to(np.eye(4), T_a_b.shape), atol=1e-14)
-    T_world = robot.placement(q, a)
-    np.testing.assert_allclose(T_world @ T_a_b, robot.placement(q, b), atol=1e-14)
+    np.testing.assert_allclose(robot.placement(q, a) @ T_a_b, robot.placement(q, b), atol=1e-14)
     assert robot.certificate().verified
 
 

@@ -57,8 +57,7 @@ def values_at(robot: Robot, q: FloatArray, names: list[str]) -> dict[str, float]
 
 
 def held(robot: Robot, name: str) -> float:
-    lock = present(robot.joints[name].lock)
-    return lock.value
+    return present(robot.joints[name].lock).value
 
 
 def kept(robot: Robot, names: list[str]) -> tuple[list[int], list[int]]:
@@ -282,8 +281,7 @@ def test_every_other_result_works_on_a_locked_robot() -> None:
     T = panda.placement(q, frame)
     table = panda.dh(frame)
     assert np.abs(table.placement(panda.select(table, q)) - T).max() < 1e-14
-    screws = panda.screws(frame)
-    assert np.abs(screws.placement(q) - T).max() < 1e-14
+    assert np.abs(panda.screws(frame).placement(q) - T).max() < 1e-14
     assert panda.tree_parameters().rows
     assert np.array_equal(panda.prepare(frame).placement(q), T)
     scope: dict[str, Any] = {}

@@ -143,8 +143,7 @@ def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
 @pytest.mark.parametrize("name", [*ROBOTS, "tiago_dual", "anymal"])
 def test_a_model_is_the_robot_it_was_built_from(name: str) -> None:
     robot = loaded(file(name), mimic=False)
-    model = pin.buildModelFromUrdf(file(name))
-    made = loaded(model)
+    made = loaded(pin.buildModelFromUrdf(file(name)))
     assert made.frame_names == robot.frame_names
     assert made.tree.links == robot.tree.links
     assert [joint.parent for joint in made.tree.joints] == [joint.parent for joint in robot.tree.joints]

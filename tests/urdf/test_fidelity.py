@@ -49,8 +49,7 @@ def test_every_axis_with_a_direction_is_a_unit_vector_in_the_tree(axis: str) -> 
 
 
 def test_an_axis_that_is_not_written_is_x() -> None:
-    robot = verified(arm(axis=""))
-    assert robot.tree.joints[0].axis.tolist() == [1.0, 0.0, 0.0]
+    assert verified(arm(axis="")).tree.joints[0].axis.tolist() == [1.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("element", ["<axis/>", '<axis note="z"/>', "<axis><!-- 0 0 1 --></axis>"])
@@ -67,8 +66,7 @@ def test_a_planar_joint_whose_axis_element_is_empty_moves_in_the_xy_plane_for_bo
 def test_joints_stand_depth_first_and_siblings_by_name_not_as_in_the_file() -> None:
     """Yourdfpy keeps the order of the file."""
     more = '<link name="x"/><joint name="a0" type="continuous"><parent link="base"/><child link="x"/></joint>'
-    robot = verified(arm(more=more))
-    assert robot.joint_names == ("a0", "j1", "j2")
+    assert verified(arm(more=more)).joint_names == ("a0", "j1", "j2")
 
 
 def test_a_follower_takes_no_coordinate_and_is_coupled() -> None:
@@ -102,8 +100,7 @@ def test_a_fixed_followers_mimic_is_ignored() -> None:
 def test_a_planar_joint_moves_in_its_frames_xy_plane(axis: str) -> None:
     """Yourdfpy does not move planar joints; the specification's normal is ignored as Pinocchio ignores it."""
     robot = verified(arm(attributes='type="planar"', axis=axis, limit="", origin=""))
-    T = robot.placement([0.3, -0.2, 0.0, 0.0], "link:l1")
-    assert T[:3, 3].tolist() == [0.3, -0.2, 0.0]
+    assert robot.placement([0.3, -0.2, 0.0, 0.0], "link:l1")[:3, 3].tolist() == [0.3, -0.2, 0.0]
 
 
 def test_a_floating_joint_has_seven_coordinates_and_six_rates() -> None:
@@ -113,8 +110,7 @@ def test_a_floating_joint_has_seven_coordinates_and_six_rates() -> None:
 
 
 def test_limits_of_a_continuous_joint_are_ignored() -> None:
-    robot = verified(arm(attributes='type="continuous"'))
-    limit = present(robot.tree.joints[0].limit)
+    limit = present(verified(arm(attributes='type="continuous"')).tree.joints[0].limit)
     assert (limit.lower, limit.upper) == (-np.inf, np.inf)
 
 

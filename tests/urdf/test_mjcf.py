@@ -185,8 +185,7 @@ def test_an_equality_between_two_joints_is_obeyed() -> None:
     assert (follower.mimic.leader, follower.mimic.multiplier) == ("pitch", 2.0)
     # y - 0 = 0.1 + 2 (x - 30 degrees)
     assert follower.mimic.offset == pytest.approx(0.1 - math.pi / 3)
-    free = loaded(TWO, mimic=False)
-    assert free.nq == robot.nq + 1
+    assert loaded(TWO, mimic=False).nq == robot.nq + 1
 
 
 @pytest.mark.parametrize(
@@ -242,8 +241,7 @@ def test_what_is_mjcf_is_told_by_its_root(tmp_path: Path) -> None:
 
 def test_it_may_come_as_bytes_or_from_a_stream(monkeypatch: pytest.MonkeyPatch) -> None:
     text = one_joint('<joint name="j" axis="0 0 1" pos="0 2 0"/>')
-    standard_input = io.TextIOWrapper(io.BytesIO(text.encode()))
-    monkeypatch.setattr("sys.stdin", standard_input)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
     data = text.encode()
     sources: list[Source] = [text, data, b"\xef\xbb\xbf" + data, io.StringIO(text), io.BytesIO(data), "-"]
     for source in sources:
@@ -262,8 +260,7 @@ def test_each_of_its_findings_has_a_page_whose_examples_are_true(code: str) -> N
         for text in (said.example, said.cure)
     ] == [{code}, set()]
     assert next(f for f in loaded(said.example).findings if f.code == code).severity is rule.severity
-    shown = command("explain", rule.slug)
-    assert shown.text.startswith(f"{code} {rule.slug} ({rule.severity.value})")
+    assert command("explain", rule.slug).text.startswith(f"{code} {rule.slug} ({rule.severity.value})")
 
 
 @pytest.mark.slow

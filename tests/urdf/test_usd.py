@@ -143,8 +143,7 @@ def test_limits_are_degrees_and_a_joint_without_limits_is_continuous(read: Read)
 def test_lengths_are_in_the_stages_unit(read: Read, unit: float) -> None:
     robot = read(LINKS + JOINTS, unit=unit)
     assert reach(robot) == pytest.approx(2.0 * unit)
-    limit = present(robot.tree.joints[1].limit)
-    assert limit.upper == pytest.approx(3.0 * unit)
+    assert present(robot.tree.joints[1].limit).upper == pytest.approx(3.0 * unit)
 
 
 def test_a_stage_with_y_up_is_turned_so_that_z_is_up(read: Read) -> None:
@@ -718,8 +717,7 @@ def test_a_reference_outside_the_folder_is_refused(
 
 def test_layers_that_refer_to_each_other_end(write: Write) -> None:
     write(sublayered(stage(LINKS + JOINTS), "b.usda"), "a.usda")
-    robot = loaded(write(sublayered(stage(LINKS + JOINTS), "a.usda"), "b.usda"))
-    assert "USD103" in codes(robot)
+    assert "USD103" in codes(loaded(write(sublayered(stage(LINKS + JOINTS), "a.usda"), "b.usda")))
 
 
 @pytest.mark.parametrize("layer", ["./gone.usda", "configuration/gone.usda"])  # Isaac Sim writes the second
@@ -1010,8 +1008,7 @@ _MOVED = {
 
 def _with_first_axis(axis: Any) -> Any:
     """A rotation whose x axis is a unit vector."""
-    other = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    y = np.cross(axis, other)
+    y = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     y /= np.linalg.norm(y)
     return np.column_stack((axis, y, np.cross(axis, y)))
 
@@ -1245,8 +1242,7 @@ def test_three_formats_are_compared_in_pairs(
 def test_diff_with_a_stage_lists_a_slip_at_its_joint_and_not_the_rounding(
     write: Write, tmp_path: Path
 ) -> None:
-    text = LONG_SLIDE.replace("elbow", "elbow-1").replace("forearm", "forearm.1")
-    robot = urdfkin.load(text)
+    robot = urdfkin.load(LONG_SLIDE.replace("elbow", "elbow-1").replace("forearm", "forearm.1"))
     plain = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded))))
     assert (plain.changes, plain.total) == ((), None)
     assert plain.rounding is not None
@@ -1487,8 +1483,7 @@ def test_two_rounded_stages_of_a_robot_are_the_same_up_to_the_roundings_of_both(
     write: Write, name: str
 ) -> None:
     """The second stage is written from the first one, with other frames on the axis of a joint."""
-    robot = loaded(name)
-    first = loaded(write(as_usd(robot, transcoded)))
+    first = loaded(write(as_usd(loaded(name), transcoded)))
     moving = [one.name for one in first.tree.joints if one.kind.nq == 1]
     elsewhere = Slip("other frames on the axis", moving[len(moving) // 2])
     second = loaded(write(as_usd(first, transcoded, elsewhere), "second.usda"))

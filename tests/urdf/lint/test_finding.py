@@ -33,8 +33,7 @@ def test_a_finding_is_plain_data() -> None:
 
 
 def test_an_error_carries_all_findings_and_prints_the_first() -> None:
-    findings = check('<robot name="r">' + '<link name="a"/>' * 9 + "</robot>")
-    error = UrdfError(findings)
+    error = UrdfError(check('<robot name="r">' + '<link name="a"/>' * 9 + "</robot>"))
     assert isinstance(error, UrdfkinError)
     assert len(error.findings) == 8
     assert str(error).startswith("<text>: the URDF has 8 errors; run 'urdfkin explain URDF402' for details")

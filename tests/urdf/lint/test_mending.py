@@ -73,8 +73,7 @@ def test_nothing_but_what_is_cured_changes_a_byte() -> None:
 
 
 def test_a_byte_order_mark_stays_where_it_is() -> None:
-    done = mended(codecs.BOM_UTF8 + SLOPPY.encode())
-    assert done.text.data == codecs.BOM_UTF8 + TIDY.encode()
+    assert mended(codecs.BOM_UTF8 + SLOPPY.encode()).text.data == codecs.BOM_UTF8 + TIDY.encode()
 
 
 @pytest.mark.slow
@@ -187,8 +186,7 @@ def test_a_rounded_pi_turns_no_frame_by_more_than_its_fix_says() -> None:
     (finding,) = done.fixed
     a, b = (urdfkin.load(data) for data in (rough, done.text.data))
     R_a, R_b = (robot.placement(robot.neutral(), "l1")[:3, :3] for robot in (a, b))
-    turned = math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0)
-    assert 0.0 < turned <= present(finding.fix).turns < 1.2e-5
+    assert 0.0 < math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0) <= present(finding.fix).turns < 1.2e-5
 
 
 def test_the_differences_that_are_looked_for_are_all_there_are() -> None:
