@@ -152,8 +152,7 @@ def _of_table(q: FloatArray) -> FloatArray:
     rows = [[0.1, 0.7, 0.2, 0.3], [0.0, -0.4, 0.1, 0.2], [0.2, 0.5, -0.3, 0.1, "P"]]
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = exp_rotation([0.3, -0.2, 0.5]), (0.1, 0.2, 0.3)
-    table = replace(table_from_rows(rows, "standard"), base=T, tool=T @ T)
-    robot = urdfkin.load(table)
+    robot = urdfkin.load(replace(table_from_rows(rows, "standard"), base=T, tool=T @ T))
     return robot.placement(q, robot.tip_frame)
 
 

@@ -4,7 +4,8 @@ import ast
 import importlib
 import inspect
 import sys
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from itertools import islice
 
 import numpy as np
@@ -121,8 +122,7 @@ def test_near_the_singularity_it_is_verified_and_the_bound_grows(free: Robot, na
             assert distance < 1e-12
         # Nobody is told that this was checked.
         assert np.isfinite(free.analytical_jacobian(q, "body", name, nearest=0.0, verify=False)).all()
-    line = next(x for x in free.certificate().lines if x.quantity == "analytical jacobian")
-    assert line.share < 0.5
+    assert next(x for x in free.certificate().lines if x.quantity == "analytical jacobian").share < 0.5
 
 
 @pytest.mark.parametrize("name", ["ZYZ", "xyz"])
@@ -171,12 +171,9 @@ def test_the_line_of_nodes_gives_the_rates_that_differences_give(name: str) -> N
 def test_the_line_of_nodes_shares_nothing_with_what_it_checks_and_a_quaternions_rates_keep_its_length() -> (
     None
 ):
-    imported = [
-        node.module or ""
-        for node in ast.walk(ast.parse(inspect.getsource(sys.modules[euler_jacobian.__module__])))
-        if isinstance(node, ast.ImportFrom)
-    ]
-    assert set(imported) == {"__future__", "typing", "numpy.typing"}
+    tree = ast.parse(inspect.getsource(sys.modules[euler_jacobian.__module__]))
+    imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert imported == {"__future__", "typing", "numpy.typing"}
     rng = np.random.default_rng(2)
     quat, J = rng.normal(size=(50, 4)), rng.normal(size=(50, 6, 5))
     quat /= np.linalg.norm(quat, axis=1, keepdims=True)
@@ -219,15 +216,15 @@ def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | No
     return J if sum(line.unchecked for line in robot.certificate().lines) == before else None
 
 
-def names_called(work: Callable[[], object]) -> set[str]:
+@contextmanager
+def names_called() -> Iterator[set[str]]:
     """The functions in Python that are called meanwhile."""
     names = set[str]()
     sys.setprofile(lambda frame, *_: names.add(frame.f_code.co_qualname.replace(".<locals>", "")))
     try:
-        work()
+        yield names
     finally:
         sys.setprofile(None)
-    return names
 
 
 @pytest.mark.long
@@ -241,7 +238,8 @@ def test_no_mutant_ends_verified_and_wrong(ur5: Robot, name: str) -> None:
         rotation._sequence.cache_clear()
         return {representation: outcome(ur5, q, representation) for representation in REPRESENTATIONS}
 
-    true, called = results(), names_called(results)
+    with names_called() as called:
+        true = results()
     tried, caught, wrong = 0, 0, []
     for words, tree in mutants(source, called):
         tried += make(module, tree)

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.running import python
+
 pytestmark = pytest.mark.long
 ROBOTS = Path(__file__).parents[2] / "robots"
 PLANTED = [
@@ -115,10 +117,7 @@ def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
         "repr(c.CACHE_DIR), c.DISABLE_JIT, repr(getattr(c, 'CACHE_LOCATOR_CLASSES', '')), os.getcwd())"
     )
     environ = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, env=environ, capture_output=True, text=True, check=True
-    )
-    assert done.stdout == f"'' 0 '' {tmp_path}\n"
+    assert python(code, cwd=tmp_path, env=environ).stdout == f"'' 0 '' {tmp_path}\n"
 
 
 def test_a_drawing_takes_no_settings_from_there(tmp_path: Path, command: list[str]) -> None:

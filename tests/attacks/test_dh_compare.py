@@ -1,6 +1,7 @@
 """A comparison says what it fitted, what it did not compare, and which cell is wrong by how much."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -71,8 +72,7 @@ def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
 def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cell: str) -> None:
     path = ur5()
     table = dh_table(urdfkin.load("ur5").tree, "tool0", "base", convention, snap=1e-6)
-    right = compare(path, table, fit=False)
-    assert right.agrees
+    assert compare(path, table, fit=False).agrees
     wrong = with_cell(table, row, **{cell: getattr(table.rows[row], cell) + 3e-3})
     found = compare(path, wrong, fit=False)
     assert not found.agrees
@@ -146,8 +146,7 @@ def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name:
 
 
 def test_cells_come_in_the_order_of_their_effect() -> None:
-    robot = urdfkin.load("ur5")
-    table = dh_table(calibrated(robot.tree, 1), "tool0", "base")
+    table = dh_table(calibrated(urdfkin.load("ur5").tree, 1), "tool0", "base")
     effects = [one.tip for one in compare(ur5(), table).differences]
     assert len(effects) > 5
     assert effects == sorted(effects, reverse=True)
@@ -164,21 +163,17 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
     written: str, is_rounding: bool, suffix: str, tmp_path: Path
 ) -> None:
     """UR5's d5 is 0.09465."""
-    rows = [
-        ["0", "pi/2", "0.089159"], ["-0.425", "0", "0"], ["-0.39225", "0", "0"],
-        ["0", "pi/2", "0.10915"], ["0", "-pi/2", written], ["0", "0", "0.0823"],
-    ]  # fmt: skip
-    quoted = [[cell if "pi" not in cell else f'"{cell}"' for cell in row] for row in rows]
-    lists = ", ".join(f"[{', '.join(row)}, 0]" for row in quoted)
-    texts = {
-        ".toml": f'convention = "standard"\nrows = [{lists}]',
-        ".json": f'{{"convention": "standard", "rows": [{lists}]}}',
-        ".csv": "\n".join(
-            ["# convention: standard", "a,alpha,d,theta", *(f"{','.join(row)},0" for row in rows)]
-        ),
-    }
+    lines = (
+        "0,pi/2,0.089159,0", "-0.425,0,0,0", "-0.39225,0,0,0", "0,pi/2,0.10915,0", f"0,-pi/2,{written},0",
+        "0,0,0.0823,0",
+    )  # fmt: skip
+    rows = ", ".join(f"[{re.sub('-?pi/2', lambda x: repr(x[0]), line)}]".replace("'", '"') for line in lines)
     file = tmp_path / f"sheet{suffix}"
-    file.write_text(texts[suffix])
+    file.write_text({
+        ".toml": f'convention = "standard"\nrows = [{rows}]',
+        ".json": f'{{"convention": "standard", "rows": [{rows}]}}',
+        ".csv": "\n".join(["# convention: standard", "a,alpha,d,theta", *lines]),
+    }[suffix])  # fmt: skip
     data = read_mapping(file)
     found = compare(ur5(), table_of(data, "sheet"), digits=last_digits(data))
     largest = found.differences[0]

@@ -13,6 +13,7 @@ from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as command
 from tests.dh.arms import arm
 from tests.random_chains import rotation, shift
+from tests.reading import present
 from tests.urdfs import joint, limit, mimic, robot
 from urdfkin.dh import DHTable, Units, dh_table, export
 from urdfkin.dh.parse_table import reference_path
@@ -44,15 +45,8 @@ def leaning(tilt: float) -> KinematicTree:
 
 def text_of(tree: KinematicTree) -> str:
     """The URDF of an arm, its joints without limits."""
-    return to_urdf(
-        replace(
-            tree,
-            joints=tuple(
-                replace(joint, kind=JointKind.CONTINUOUS) if joint.kind.turns else joint
-                for joint in tree.joints
-            ),
-        )
-    )
+    joints = (replace(one, kind=JointKind.CONTINUOUS) if one.kind.turns else one for one in tree.joints)
+    return to_urdf(replace(tree, joints=tuple(joints)))
 
 
 def robot_of(tree: KinematicTree) -> urdfkin.Robot:
@@ -102,12 +96,10 @@ def test_a_wrong_strict_table_is_a_disagreement_however_long_its_rows_are() -> N
 
 def rack(multiplier: float) -> str:
     """A slide, a joint that turns with it, and one that turns alone, all askew."""
-    origin, follows = 'xyz="0.1 0.2 0.3" rpy="{} 0.4 0.5"', mimic("rack", multiplier)
+    origin, follows = 'xyz="0.1 0.2 0.3" rpy="{} 0.4 0.5"', mimic("rack", multiplier) + limit(-100000, 100000)
     return robot(
         joint("rack", "prismatic", "a", "b", origin.format(0.3), "0.6 0 0.8", limit()),
-        joint(
-            "pinion", "revolute", "b", "c", origin.format(1.3), "0.6 0 0.8", limit(-100000, 100000) + follows
-        ),
+        joint("pinion", "revolute", "b", "c", origin.format(1.3), "0.6 0 0.8", follows),
         joint("j", "continuous", "c", "d", 'xyz="0.4 0.1 0.3" rpy="1.3 0.4 0.5"', "0 0.6 0.8"),
         name="rack",
     )
@@ -121,8 +113,7 @@ def test_a_right_table_of_a_rack_and_pinion_is_right_whatever_the_multiplier(
 ) -> None:
     found = urdfkin.load(rack(multiplier))
     for convention in ("standard", "modified"):
-        check = checked(found, found.dh(*ends, convention))
-        assert check.within
+        assert checked(found, found.dh(*ends, convention)).within
 
 
 @pytest.mark.parametrize("multiplier", [30, 1000])
@@ -138,6 +129,16 @@ def test_a_wrong_multiplier_in_a_table_is_still_found(multiplier: float) -> None
 # -- noise ----------------------------------------------------------------------------------------------
 
 
+def demand_a_plain_table(tree: KinematicTree, near_parallel: str) -> DHTable:
+    """A table without beta and without kilometres, that is the robot to rounding."""
+    robot = robot_of(tree)
+    table = robot.dh("tip", "l0", near_parallel=near_parallel)
+    assert not table.has_hayati_rows
+    assert max(max(abs(row.a), abs(row.d)) for row in table.rows) < 2.0
+    assert checked(robot, table).within
+    return table
+
+
 @pytest.mark.parametrize("angle", [1.5707963267949, 1.570796326794897, 1.57079632679489661923])
 @pytest.mark.parametrize("near_parallel", ["hayati", "strict"])
 def test_an_angle_written_with_fourteen_digits_gets_no_beta_and_no_kilometres(
@@ -151,12 +152,7 @@ def test_an_angle_written_with_fourteen_digits_gets_no_beta_and_no_kilometres(
         shift(0.1, 0.3, 0.2) @ rotation("x", math.pi / 2),
         tip=shift(0.1, 0, 0.08),
     )
-    robot = robot_of(tree)
-    table = robot.dh("tip", "l0", near_parallel=near_parallel)
-    assert not table.has_hayati_rows
-    assert max(max(abs(row.a), abs(row.d)) for row in table.rows) < 2.0
-    assert checked(robot, table).within
-    assert "roboticstoolbox" in export(table, "roboticstoolbox")
+    assert "roboticstoolbox" in export(demand_a_plain_table(tree, near_parallel), "roboticstoolbox")
 
 
 @pytest.mark.parametrize("near_parallel", ["hayati", "strict"])
@@ -168,12 +164,8 @@ def test_two_angles_of_fifteen_digits_that_tilt_together_are_rounding(near_paral
         shift(0.1, 0.3, 0.2) @ rotation("x", math.pi / 2),
         tip=shift(0.1, 0, 0.08),
     )
-    robot = robot_of(tree)
     assert chain(tree, "tip").constants[1][0, 2] != 0.0
-    table = robot.dh("tip", "l0", near_parallel=near_parallel)
-    assert not table.has_hayati_rows
-    assert max(max(abs(row.a), abs(row.d)) for row in table.rows) < 2.0
-    assert checked(robot, table).within
+    demand_a_plain_table(tree, near_parallel)
 
 
 @pytest.mark.parametrize("tilt", [1e-13, 1e-12, 1e-9])
@@ -182,8 +174,7 @@ def test_a_tilt_that_is_no_rounding_is_kept(tilt: float) -> None:
     table = dh_table(tree, "tip", "l0")
     assert table.has_hayati_rows
     q = np.random.default_rng(0).uniform(-3, 3, (50, 4))
-    error = np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max()
-    assert error <= 20 * EPS
+    assert np.abs(table.placement(q) - chain(tree, "tip").placement(q)).max() <= 20 * EPS
 
 
 @pytest.mark.slow
@@ -192,11 +183,9 @@ def test_so101_has_no_foot_at_the_inverse_of_rounding_and_baxter_is_told_to_snap
     table = robot.dh(near_parallel="strict")
     assert checked(robot, table).within
     assert max(abs(row.d) for row in table.rows) < 1.0
-    done = good("dh baxter")
-    hint = next(line for line in done.text.splitlines() if line.startswith("hint: "))
+    hint = next(line for line in good("dh baxter").text.splitlines() if line.startswith("hint: "))
     assert "--snap 1e-11" in hint
-    snapped = urdfkin.load("baxter").dh(snap=1e-11)
-    assert noisy_cells(snapped) == []
+    assert noisy_cells(urdfkin.load("baxter").dh(snap=1e-11)) == []
     assert "--snap" not in command("dh baxter --snap 1e-11").text
 
 
@@ -207,35 +196,26 @@ def test_a_clean_table_gets_no_hint_at_snapping(name: str) -> None:
 
 # -- options ---------------------------------------------------------------------------------------
 
-
-CHOICES = (
-    "--snap 1e-3", "--convention modified", "--near-parallel strict", "--last flange",
-    "--parallel-offset each", "--flip nonsense",
-)  # fmt: skip
-
-
 IDLE = [
-    *(("ur5", *idle, *choice.split()) for idle in (("--compare", "ur5"), ("--tree",)) for choice in CHOICES),
-    ("ur5", "--compare", "ur5", "--no-verify"),
-    ("ur5", "--compare", "ur5", "--format", "json", "--millimetres"),
-    ("ur5", "--tree", "--base", "base"),
-    ("ur5", "--tree", "--tip", "tool0"),
-    ("ur5", "--tree", "--format", "csv", "--degrees"),
-    ("ur5", "--all", "--tip", "tool0"),
-    ("ur5", "--tolerance", "1"),
-    ("ur5", "--no-fit"),
-    ("ur5", "--format", "toml", "--digits", "5"),
-    ("ur5", "--format", "c", "--degrees"),
-    (str(reference_path("ur5")), "--no-mimic"),
-    (str(reference_path("ur5")), "--root-joint", "floating"),
-    (str(reference_path("ur5")), "--xacro-arg", "a:=1"),
-]
+    *(
+        f"ur5 {idle} {choice}"
+        for idle in ("--compare ur5", "--tree")
+        for choice in (
+            "--snap 1e-3", "--convention modified", "--near-parallel strict", "--last flange",
+            "--parallel-offset each", "--flip nonsense",
+        )
+    ),
+    "ur5 --compare ur5 --no-verify", "ur5 --compare ur5 --format json --millimetres",
+    "ur5 --tree --base base", "ur5 --tree --tip tool0", "ur5 --tree --format csv --degrees",
+    "ur5 --all --tip tool0", "ur5 --tolerance 1", "ur5 --no-fit", "ur5 --format toml --digits 5",
+    "ur5 --format c --degrees", "TABLE --no-mimic", "TABLE --root-joint floating", "TABLE --xacro-arg a:=1",
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("words", IDLE, ids=lambda words: " ".join(words[1:]))
-def test_an_option_that_does_nothing_is_an_error(words: tuple[str, ...]) -> None:
-    err = refused("dh", *words)
-    idle = next(word for word in reversed(words) if word.startswith("--"))
+@pytest.mark.parametrize("line", IDLE)
+def test_an_option_that_does_nothing_is_an_error(line: str) -> None:
+    err = refused("dh", *line.replace("TABLE", str(reference_path("ur5"))).split())
+    idle = next(word for word in reversed(line.split()) if word.startswith("--"))
     assert re.search(rf"{idle}\S* does nothing .*; leave out this option", err)
 
 
@@ -248,14 +228,12 @@ def test_what_stands_at_its_default_is_not_refused_but_an_idle_seed_is() -> None
 
 # -- xacro ----------------------------------------------------------------------------------------------
 
-XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
-<xacro:include filename="part.xacro"/>
+XMLNS = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+XACRO = f"""<robot name="r" {XMLNS}><xacro:include filename="part.xacro"/>
 <xacro:arg name="length" default="1"/><link name="a"/><link name="b"/>
 <joint name="j" type="continuous"><parent link="a"/><child link="b"/>
 <origin xyz="$(arg length) $(arg width) 0"/><axis xyz="0 0 1"/></joint></robot>"""
-PART = (
-    """<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="colour" default="red"/></robot>"""
-)
+PART = f'<robot {XMLNS}><xacro:arg name="colour" default="red"/></robot>'
 
 
 @pytest.fixture
@@ -292,12 +270,11 @@ def test_an_unknown_xacro_argument_is_an_error_that_names_the_known(xacro: Path)
 # -- digits ---------------------------------------------------------------------------------------------
 
 
-def lost(text: str) -> tuple[float, float]:
-    """Metres measured and guaranteed, as the line says."""
-    line = next(line for line in text.splitlines() if line.startswith("printed with"))
-    found = re.search(r"within (\S+) m of its exact .* the proven bound is (\S+) m", line)
-    assert found is not None
-    return float(found[1]), float(found[2])
+def lost(text: str) -> tuple[float, ...]:
+    """Metres measured and guaranteed, as the line says; of a whole tree, the measured ones alone."""
+    (line,) = (line for line in text.splitlines() if line.startswith("printed with"))
+    of_a_table = re.search(r"within (\S+) m of its exact .* the proven bound is (\S+) m", line)
+    return tuple(map(float, present(of_a_table or re.search(r"within (\S+) m", line)).groups()))
 
 
 @pytest.mark.slow
@@ -311,13 +288,11 @@ def test_three_digits_are_said_to_lose_nearly_a_millimetre(form: str, units: tup
 
 
 def test_latex_says_it_on_stderr_and_the_whole_tree_as_well() -> None:
-    done = command("dh ur10 --base base --tip tool0 --digits 3 --format latex")
-    assert lost(done.err)[0] > 5e-4
+    measured, _ = lost(command("dh ur10 --base base --tip tool0 --digits 3 --format latex").err)
+    assert measured > 5e-4
     text = command("dh ur10 --tree --digits 3").text
-    line = next(line for line in text.splitlines() if line.startswith("printed with 3 digits"))
-    found = re.search(r"within (\S+) m", line)
-    assert found is not None
-    assert float(found[1]) > 5e-4
+    assert "printed with 3 digits" in text
+    assert lost(text)[0] > 5e-4
 
 
 @pytest.mark.slow
@@ -340,26 +315,16 @@ def test_what_the_digits_lose_stays_within_what_is_guaranteed(
 
 def test_the_loss_is_the_distance_to_the_table_that_the_text_says() -> None:
     """Cells as `--digits 3 --millimetres --degrees` prints them, typed in again."""
-    robot = urdfkin.load("ur10")
-    table = robot.dh("tool0", "base", snap=1e-6)
-    line = "dh ur10 --base base --tip tool0 --snap 1e-6 --digits 3 --millimetres --degrees"
-    typed = rows_of(command(line).text)
-    again = replace(
-        table,
-        rows=tuple(
-            replace(row, a=a / 1e3, alpha=math.radians(alpha), d=d / 1e3)
-            for row, (a, alpha, d) in zip(table.rows, typed, strict=True)
-        ),
+    table = urdfkin.load("ur10").dh("tool0", "base", snap=1e-6)
+    text = command("dh ur10 --base base --tip tool0 --snap 1e-6 --digits 3 --millimetres --degrees").text
+    lines = [line.split() for line in text.splitlines() if re.match(r"\d  ", line)]
+    typed = [[float(cell) for cell in line[2:5]] for line in lines]
+    rows = (
+        replace(row, a=a / 1e3, alpha=math.radians(alpha), d=d / 1e3)
+        for row, (a, alpha, d) in zip(table.rows, typed, strict=True)
     )
+    again = replace(table, rows=tuple(rows))
     found = printed(table, Units(Angles.DEGREES, Lengths.MILLIMETRES, 3))
-    assert distance(again, table) == pytest.approx(found.metres, rel=0.05)
-
-
-def rows_of(text: str) -> list[list[float]]:
-    rows = [line.split() for line in text.splitlines() if re.match(r"\d  ", line)]
-    return [[float(cell) for cell in row[2:5]] for row in rows]
-
-
-def distance(one: DHTable, other: DHTable) -> float:
-    q = np.random.default_rng(5).uniform(-math.pi, math.pi, (2000, len(one.joint_names)))
-    return float(np.linalg.norm((one.placement(q) - other.placement(q))[:, :3, 3], axis=-1).max())
+    q = np.random.default_rng(5).uniform(-math.pi, math.pi, (2000, len(table.joint_names)))
+    apart = np.linalg.norm((again.placement(q) - table.placement(q))[:, :3, 3], axis=-1)
+    assert apart.max() == pytest.approx(found.metres, rel=0.05)

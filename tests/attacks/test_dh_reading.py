@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from tests.reading import present
 from urdfkin.dh import export, read_table, table_from_mapping, table_from_rows
 from urdfkin.dh.parse_table import read_mapping, references, table_from_text
 from urdfkin.dh.rows import last_digits
@@ -133,27 +135,22 @@ def test_a_right_list_is_no_other_order(rows: list[list[Any]]) -> None:
 
 def test_lengths_hold_for_base_tool_limits_and_followers() -> None:
     data = {
-        "convention": "standard",
-        "angles": "degrees",
-        "lengths": "millimetres",
+        "convention": "standard", "angles": "degrees", "lengths": "millimetres",
         "base": [[1, 0, 0, 100], [0, 1, 0, 0], [0, 0, 1, 250]],
-        "tool": np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 107], [0, 0, 0, 1]]).tolist(),
+        "tool": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 107], [0, 0, 0, 1]],
         "rows": [
             {"joint": "turn", "a": 400, "limit": {"lower": -90, "upper": 180, "velocity": 90}},
             {"joint": "slide", "kind": "P", "limit": {"lower": -50, "upper": 500}},
             {"joint": "follow", "kind": "P", "mimic": {"leader": "slide", "offset": 10, "multiplier": 2}},
         ],
-    }
+    }  # fmt: skip
     table = table_from_mapping(data)
     assert table.base[:3, 3].tolist() == [0.1, 0.0, 0.25]
     assert table.tool[:3, 3].tolist() == [0.0, 0.0, 0.107]
-    turn, slide, follow = table.rows
-    assert turn.limit is not None
-    assert slide.limit is not None
-    assert follow.mimic is not None
-    assert (turn.limit.lower, turn.limit.upper, turn.limit.velocity) == (-math.pi / 2, math.pi, math.pi / 2)
-    assert (slide.limit.lower, slide.limit.upper) == (-0.05, 0.5)
-    assert (follow.mimic.multiplier, follow.mimic.offset) == (2.0, 0.01)
+    turn, slide, rule = present(table.rows[0].limit), present(table.rows[1].limit), table.rows[2].mimic
+    assert (turn.lower, turn.upper, turn.velocity) == (-math.pi / 2, math.pi, math.pi / 2)
+    assert (slide.lower, slide.upper) == (-0.05, 0.5)
+    assert (present(rule).multiplier, present(rule).offset) == (2.0, 0.01)
 
 
 def test_lists_arrays_and_short_names_of_units_are_understood() -> None:
@@ -188,15 +185,8 @@ def test_a_leader_elsewhere_on_the_robot_is_a_coordinate_and_survives_being_writ
 # -- any type at any key --------------------------------------------------------------------------------
 
 _GOOD: dict[str, Any] = {
-    "convention": "standard",
-    "angles": "radians",
-    "lengths": "metres",
-    "robot": "r",
-    "base_frame": "b",
-    "tip_frame": "t",
-    "base": np.eye(4).tolist(),
-    "tool": np.eye(4).tolist(),
-    "coordinates": ["far"],
+    "convention": "standard", "angles": "radians", "lengths": "metres", "robot": "r", "base_frame": "b",
+    "tip_frame": "t", "base": np.eye(4).tolist(), "tool": np.eye(4).tolist(), "coordinates": ["far"],
     "rows": [
         {"joint": "j1", "kind": "R", "a": 0.1, "alpha": 0.2, "d": 0.3, "theta": 0.4, "beta": 0.0, "sense": 1,
          "limit": {"lower": -1, "upper": 1, "velocity": 1, "effort": 1}},
@@ -204,13 +194,9 @@ _GOOD: dict[str, Any] = {
         [0.1, "pi/2", 0.3, 0.0, "P"],
     ],
 }  # fmt: skip
+_WORDS = ["pi", "-pi/2", "R", "P", "j1", "j2", "degrees", 10**400, -(10**400), "1e999", "pi/0"]
 _SCALAR = (
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats()
-    | st.text(max_size=5)
-    | st.sampled_from(["pi", "-pi/2", "R", "P", "j1", "j2", "degrees", 10**400, -(10**400), "1e999", "pi/0"])
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.sampled_from(_WORDS)
 )
 _FLAT = _SCALAR | st.lists(_SCALAR, max_size=4) | st.dictionaries(st.text(max_size=5), _SCALAR, max_size=3)
 _ANYTHING = _FLAT | st.lists(_FLAT, max_size=4)
@@ -218,11 +204,7 @@ _ANYTHING = _FLAT | st.lists(_FLAT, max_size=4)
 
 def _places(data: Any, here: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     keys = data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ()
-    return (
-        [here, *(place for key in keys for place in _places(data[key], (*here, key)))]
-        if here
-        else [place for key in keys for place in _places(data[key], (key,))]
-    )
+    return [here] * bool(here) + [place for key in keys for place in _places(data[key], (*here, key))]
 
 
 _PLACES = _places(_GOOD)
@@ -254,15 +236,9 @@ def test_anything_at_any_place_is_a_table_or_an_error_of_ours(
 @given(st.text(max_size=60), st.sampled_from([".toml", ".json", ".csv"]))
 @settings(max_examples=300)
 def test_any_text_is_a_table_or_an_error_of_ours(text: str, suffix: str) -> None:
-    for whole in (
-        text,
-        f"# convention: standard\na,alpha,d,theta\n{text}",
-        f'convention = "standard"\n{text}',
-    ):
-        try:
-            table_from_text(whole, suffix)
-        except UrdfkinError:
-            continue
+    for head in ("", "# convention: standard\na,alpha,d,theta\n", 'convention = "standard"\n'):
+        with suppress(UrdfkinError):
+            table_from_text(head + text, suffix)
 
 
 def test_nesting_without_end_is_an_error_of_ours() -> None:

@@ -128,12 +128,8 @@ def assembled(part: dict[str, str]) -> bytes:
 
 
 def some_odd_pieces(choose: random.Random) -> bytes:
-    return assembled(
-        {
-            slot: pieces[0] if choose.random() < PLAIN else choose.choice(pieces)
-            for slot, pieces in SLOTS.items()
-        }
-    )
+    odd = ((slot, x[0] if choose.random() < PLAIN else choose.choice(x)) for slot, x in SLOTS.items())
+    return assembled(dict(odd))
 
 
 def every_odd_piece() -> Iterator[bytes]:

@@ -4,7 +4,6 @@ import ast
 import re
 import shutil
 import subprocess
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import urdfkin
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from tests.export.writing import code, file, need
+from tests.urdfs import loaded
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.naming import all_safe, safe, shown, title
 from urdfkin.robot import Robot
@@ -29,12 +28,6 @@ _WORDS = (
 )  # fmt: skip
 
 
-def loaded(text: str) -> Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(text, verify=False)
-
-
 _HOSTILE = ("c comment", "python", "matlab", "latex", "line")
 ROBOTS = {
     "every name at once": chain_of_all(),
@@ -45,7 +38,7 @@ ROBOTS = {
 
 @pytest.fixture(scope="module", params=ROBOTS)
 def robot(request: pytest.FixtureRequest) -> Robot:
-    return loaded(ROBOTS[request.param])
+    return loaded(ROBOTS[request.param], verify=False)
 
 
 def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> None:
@@ -81,12 +74,8 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
     helpers = {"numpy": ["_demand"], "casadi": ["_demand"], "array": ["_namespace", *checked]}
     helpers |= {"jax": checked, "torch": checked}
     assert [node.name for node in module.body if isinstance(node, ast.FunctionDef)] == [
-        *helpers.get(to, []),
-        "placement",
-        *(["gradients"] if to == "torch" else []),
-        "_values",
-        "check",
-    ]
+        *helpers.get(to, []), "placement", *(["gradients"] if to == "torch" else []), "_values", "check",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("to", ["numpy", "array", "torch", "sympy-exact"])

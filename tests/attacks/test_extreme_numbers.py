@@ -54,10 +54,7 @@ def numbers(rng: np.random.Generator, exponent: int, size: int) -> FloatArray:
 def everything(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None) -> int:
     """Every quantity of the last link in every reference; how many leave the range of doubles."""
     beyond = 0
-    methods: list[tuple[Any, ...]] = [
-        (robot.placement, q),
-        *((x, q) for x in (robot.jacobian, robot.hessian)),
-    ]
+    methods: list[tuple[Any, ...]] = [(x, q) for x in (robot.placement, robot.jacobian, robot.hessian)]
     methods += [(x, q, v) for x in (robot.velocity, robot.jacobian_rate)]
     methods += [(x, q, v, a) for x in (robot.acceleration, robot.acceleration_breakdown)]
     for reference in REFERENCES:
@@ -113,15 +110,12 @@ PLANAR = robot_of(joint("f", "planar", "a", "b", 'rpy="0.3 0.4 0.5"'))
 @pytest.mark.parametrize("size", [1e-323, 1e-310, 1e-200, 1e-170, 1e-154])
 def test_rates_whose_squares_vanish_are_verified_and_their_slips_are_not_excused(size: float) -> None:
     robot = urdfkin.load(PLANAR)
-    q, v = np.array([0.0, 0.0, 0.7]), np.array([size, 2.0 * size, 0.0])
-    robot.velocity(q, v, "b")
+    q, v = np.array([[0.0, 0.0, 0.7]]), np.array([[size, 2.0 * size, 0.0]])
+    robot.velocity(q[0], v[0], "b")
     assert robot.certificate().verified
     plan = robot.plan([1])
-    bound = VELOCITY.bound(
-        plan,
-        magnitudes(plan, q[np.newaxis], v[np.newaxis], None, STILL_STATE),
-        urdfkin.Reference.LOCAL_WORLD_ALIGNED,
-    )
+    sizes = magnitudes(plan, q, v, None, STILL_STATE)
+    bound = VELOCITY.bound(plan, sizes, urdfkin.Reference.LOCAL_WORLD_ALIGNED)
     allowed = float((bound.k * np.maximum(EPS * bound.scale, LEAST_UNIT)).max())
     assert allowed <= 100.0 * max(EPS * math.hypot(size, 2.0 * size), LEAST_UNIT)
 
@@ -206,7 +200,6 @@ FAINT = robot_of(
 
 # -- results that leave the range of doubles -------------------------------------------------------
 
-
 FRAME = "tool0"
 #: Rates or accelerations of this size give w^2 d, or w x vel, beyond all numbers.
 HUGE = 1e200
@@ -265,9 +258,7 @@ def test_in_the_part_of_any_thread(ur5: Robot, threads: int | None, row: int) ->
 
 def test_on_a_base_that_moves_too_fast(ur5: Robot) -> None:
     q, v = ur5.sample(4), np.ones((4, 6))
-    one, several = np.full(6, HUGE), np.ones((4, 6))
-    several[2] = HUGE
-    for rates in (one, several):
+    for rates in (np.full(6, HUGE), np.where(np.arange(4)[:, np.newaxis] == 2, HUGE, v)):
         with pytest.raises(RangeError):
             ur5.acceleration(q, v, v, FRAME, base=BaseMotion(velocity=rates), verify=False)
 
@@ -321,15 +312,12 @@ def base_at(distance: float, rates: FloatArray) -> BaseMotion:
 def test_on_a_base_at_map_coordinates_it_is_verified_with_as_small_a_share(
     distance: float, reference: str
 ) -> None:
-    robot = urdfkin.load("panda")
-    rng = np.random.default_rng(1)
+    robot, rng = urdfkin.load("panda"), np.random.default_rng(1)
     q, (v, a) = robot.sample(60, 1), rng.normal(size=(2, 60, robot.nv))
-    robot.acceleration_breakdown(
-        q, v, a, "panda_hand", reference, base=base_at(distance, rng.normal(size=12))
-    )
+    base = base_at(distance, rng.normal(size=12))
+    robot.acceleration_breakdown(q, v, a, "panda_hand", reference, base=base)
     (line,) = robot.certificate().lines
-    assert line.quantity == "acceleration breakdown"
-    assert line.checked == 60
+    assert (line.quantity, line.checked) == ("acceleration breakdown", 60)
     assert line.share < 0.05
 
 

@@ -7,17 +7,17 @@ import resource
 import signal
 import stat
 import subprocess
-import sys
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
 
-from tests.cli.running import Done, process
+from tests.cli.running import process
 from urdfkin import compiled as recursion
 from urdfkin import kinematics
 from urdfkin.compiled import kept, machine
@@ -59,10 +59,6 @@ def was_compiled(kernel: Kernel) -> bool:
     return bool(kernel.compiled.stats.cache_misses)
 
 
-def cut(content: bytes) -> bytes:
-    return content[: len(content) // 2]
-
-
 def flipped(content: bytes) -> bytes:
     """One bit in the middle, which for a kernel is machine code."""
     middle = len(content) // 2
@@ -71,7 +67,7 @@ def flipped(content: bytes) -> bytes:
 
 DAMAGE: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda content: b"",
-    "cut": cut,
+    "cut": lambda content: content[: len(content) // 2],
     "one bit": flipped,
     "a byte more": lambda content: content + b"\x00",
     "random": lambda content: np.random.default_rng(0).bytes(len(content)),
@@ -115,26 +111,27 @@ def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) ->
     with pytest.warns(CacheWarning, match="the checksum of the file does not match its content and its name"):
         assert get(second) is None
     assert get(first) == b"of the first"
-    first.parent.rename(tmp_path / "moved")
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "moved").rename(tmp_path / "elsewhere" / "library-1")
-    assert (
-        get(tmp_path / "elsewhere" / "library-1" / "machine.code") == b"of the first"
-    )  # the cache as a whole
+    moved = tmp_path / "elsewhere" / "library-1"  # the cache as a whole
+    moved.parent.mkdir()
+    first.parent.rename(moved)
+    assert get(moved / "machine.code") == b"of the first"
 
 
 # -- no room ---------------------------------------------------------------------------------------------
+
+
+def failing(code: int) -> Callable[..., NoReturn]:
+    def fail(*_: object, **__: object) -> NoReturn:
+        raise OSError(code, os.strerror(code))
+
+    return fail
 
 
 @pytest.fixture(params=[errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO])
 def no_room(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
     """Every new file fails so; the superuser, as whom tests may run, can be refused no other way."""
     code: int = request.param
-
-    def refuse(*_: object, **__: object) -> None:
-        raise OSError(code, os.strerror(code))
-
-    monkeypatch.setattr("urdfkin.system.cache.tempfile.NamedTemporaryFile", refuse)
+    monkeypatch.setattr("urdfkin.system.cache.tempfile.NamedTemporaryFile", failing(code))
     return code
 
 
@@ -174,7 +171,9 @@ def test_a_file_that_ends_in_the_middle_leaves_nothing_behind(
 
 
 @pytest.mark.long
-def test_a_command_on_a_full_disc_gives_its_result_and_says_so(tmp_path: Path) -> None:
+def test_a_command_on_a_full_disc_gives_its_result_and_says_so(
+    tmp_path: Path, largest_file: Callable[[int], None]
+) -> None:
     """A disc of its own where the system lets one be mounted; else files may not grow."""
     cache, disc = tmp_path / "cache", ["mount", "-t", "tmpfs", "-o", "size=64k,mode=0700", "none"]
     cache.mkdir(mode=0o700)
@@ -182,9 +181,9 @@ def test_a_command_on_a_full_disc_gives_its_result_and_says_so(tmp_path: Path) -
     try:
         if mounted:
             (cache / "much").write_bytes(bytes(60_000))
-            done = process(*BATCH, XDG_CACHE_HOME=str(cache), NUMBA_CACHE_DIR="")
         else:
-            done = limited(*BATCH, XDG_CACHE_HOME=str(cache), NUMBA_CACHE_DIR="")
+            largest_file(10_000)  # a process inherits the limit, and that its signal is ignored
+        done = process(*BATCH, XDG_CACHE_HOME=str(cache), NUMBA_CACHE_DIR="")
     finally:
         if mounted:
             subprocess.run(["umount", str(cache)], check=True)
@@ -194,31 +193,16 @@ def test_a_command_on_a_full_disc_gives_its_result_and_says_so(tmp_path: Path) -
     assert "Traceback" not in done.err
 
 
-def limited(*words: str, **env: str) -> Done:
-    def limit() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
-
-    command = [sys.executable, "-m", "urdfkin", *words]
-    done = subprocess.run(
-        command, env={**os.environ, **env}, capture_output=True, check=False, preexec_fn=limit
-    )
-    return Done(done.returncode, done.stdout, done.stderr.decode())
-
-
 @pytest.mark.long
 def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path: Path) -> None:
-    def placement() -> Done:
-        return process(*BATCH, XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR="")
-
+    placement = partial(process, *BATCH, XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR="")
     placement()
     kernel = min(tmp_path.glob("urdfkin/kernels-*/[!.]*"))
     kernel.write_bytes(flipped(kernel.read_bytes()))
     done = placement()
     assert done.code == 0
-    lines = [line for line in done.err.splitlines() if "damaged" in line]
-    assert len(lines) == 1
-    assert lines[0].startswith("urdfkin: warning: ")
+    (line,) = [line for line in done.err.splitlines() if "damaged" in line]
+    assert line.startswith("urdfkin: warning: ")
     assert "damaged" not in placement().err
 
 
@@ -256,8 +240,7 @@ def test_a_folder_of_ones_own_is_closed_to_others_and_may_be_of_a_group_of_ones_
 
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o702])
 def test_a_folder_that_everybody_may_write_in_is_refused(mode: int, tmp_path: Path) -> None:
-    folder = made(tmp_path)
-    folder.chmod(mode)
+    made(tmp_path).chmod(mode)
     refused(tmp_path, r"every user can write to .*chmod go-w.* and delete")
 
 
@@ -337,27 +320,13 @@ def test_a_folder_that_can_only_be_read_is_still_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = made(tmp_path)
-
-    def refuse(*_: object, **__: object) -> None:
-        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
-
-    monkeypatch.setattr(Path, "touch", refuse)
+    monkeypatch.setattr(Path, "touch", failing(errno.EROFS))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert kept_folder("kernels", [], root=tmp_path) == folder
 
 
 # -- a folder for each state of the sources --------------------------------------------------------
-
-
-@pytest.mark.parametrize("changed", [0, 1, 2])
-def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: Path) -> None:
-    sources = [tmp_path / f"{name}.py" for name in "abc"]
-    for source in sources:
-        source.write_text("x = 1")
-    before = kept_folder("kernels", sources, root=tmp_path)
-    sources[changed].write_text("x = 2")
-    assert kept_folder("kernels", sources, root=tmp_path) not in (before, None)
 
 
 def test_every_file_of_the_part_is_among_the_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -386,17 +355,19 @@ def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
     assert str(cache._unsafe_reason(tmp_path)).startswith(f"{tmp_path} belongs to another user")
 
 
-def test_a_folder_is_the_same_until_its_sources_or_anything_beside_them_change(tmp_path: Path) -> None:
-    source = tmp_path / "source.py"
-    source.write_text("a")
-    first = kept_folder("things", [source], "1.0", root=tmp_path)
-    assert first == kept_folder("things", [source], "1.0", root=tmp_path)
+@pytest.mark.parametrize("changed", [0, 1, 2])
+def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: Path) -> None:
+    sources = [tmp_path / f"{name}.py" for name in "abc"]
+    for source in sources:
+        source.write_text("x = 1")
+    first = kept_folder("things", sources, "1.0", root=tmp_path)
+    assert first == kept_folder("things", sources, "1.0", root=tmp_path)
     others = [
-        kept_folder("things", [source], "1.1", root=tmp_path),
-        kept_folder("trees", [source], root=tmp_path),
+        kept_folder("things", sources, "1.1", root=tmp_path),
+        kept_folder("trees", sources, "1.0", root=tmp_path),
     ]
-    source.write_text("b")
-    others.append(kept_folder("things", [source], "1.0", root=tmp_path))
+    sources[changed].write_text("x = 2")
+    others.append(kept_folder("things", sources, "1.0", root=tmp_path))
     assert len({first, *others}) == 4
     assert all(folder is not None and folder.is_dir() for folder in (first, *others))
 

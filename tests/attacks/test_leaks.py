@@ -21,14 +21,8 @@ ROBOTS = 300
 @pytest.mark.long
 def test_three_hundred_robots_leave_no_object_no_descriptor_and_no_memory() -> None:
     """In a process of its own; `python -m scripts.leaks 10000` is the same for longer."""
-    done = subprocess.run(
-        [sys.executable, "-m", "scripts.leaks", str(ROBOTS)],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=Path(__file__).parents[2],
-    )
-    parts = json.loads(done.stdout)
+    command, root = [sys.executable, "-m", "scripts.leaks", str(ROBOTS)], Path(__file__).parents[2]
+    parts = json.loads(subprocess.run(command, capture_output=True, check=True, cwd=root).stdout)
     assert len(parts) == PARTS
     # The first parts fill caches, which have ends. Then one object a robot would be 180 more.
     second, last = parts[1], parts[-1]
@@ -37,11 +31,7 @@ def test_three_hundred_robots_leave_no_object_no_descriptor_and_no_memory() -> N
     assert last["MiB"] - second["MiB"] < 8.0
 
 
-COPIES: list[Callable[[Robot], Robot]] = [
-    copy.copy,
-    copy.deepcopy,
-    lambda robot: pickle.loads(pickle.dumps(robot)),
-]
+COPIES: list[Callable[[Robot], Robot]] = [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
 
 
 @pytest.mark.parametrize("copied", COPIES)

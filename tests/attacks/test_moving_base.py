@@ -25,8 +25,7 @@ ARM = robot(joint("j", "continuous", "a", "b", 'xyz="0.3 0.2 0.1" rpy="1 2 3"', 
 
 def orientations(n: int, seed: int) -> FloatArray:
     """(n, 3, 3), half of them to nine decimals, some quarter and half turns."""
-    generator = np.random.default_rng(seed)
-    vectors = generator.normal(size=(n, 3)) * 2.0
+    vectors = np.random.default_rng(seed).normal(size=(n, 3)) * 2.0
     vectors[::5] = np.pi * np.eye(3)[np.arange(len(vectors[::5])) % 3]
     R = exp_rotation(vectors)
     R[::2] = np.round(R[::2], 9)
@@ -114,8 +113,7 @@ def test_a_turned_base_stays_well_within_the_bound(reference: str) -> None:
 
 
 def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
-    arm = urdfkin.load(ARM)
-    plan, q = arm.plan([0, 1]), np.zeros((1, 1))
+    plan, q = urdfkin.load(ARM).plan([0, 1]), np.zeros((1, 1))
     moved = np.eye(4)
     moved[:3, 3] = 1.0, 2.0, 3.0
     turned = BaseMotion(at(exp_rotation([0.0, 0.0, 1.0])))
@@ -127,14 +125,10 @@ def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
 
 
 def test_the_base_of_each_sample_is_its_own() -> None:
-    panda = urdfkin.load("panda")
-    generator = np.random.default_rng(7)
+    panda, generator = urdfkin.load("panda"), np.random.default_rng(7)
     q, v = panda.sample(6, 0).reshape(2, 3, 8), generator.normal(size=(3, 8))
-    base = BaseMotion(
-        at(exp_rotation(generator.normal(size=(2, 1, 3)))),
-        generator.normal(size=(3, 6)),
-        generator.normal(size=6),
-    )
+    T = at(exp_rotation(generator.normal(size=(2, 1, 3))))
+    base = BaseMotion(T, generator.normal(size=(3, 6)), generator.normal(size=6))
     together = panda.acceleration(q, v, v, "panda_hand", base=base, verify="sample")
     for i, j in np.ndindex(2, 3):
         own = BaseMotion(base.placement[i, 0], base.velocity[j], base.acceleration)

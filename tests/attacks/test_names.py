@@ -34,17 +34,15 @@ LIKE_OURS = urdf(
 
 
 def test_an_exact_name_wins_and_a_link_frame_is_that_link() -> None:
-    robot = loaded(LIKE_OURS)
+    foo, other, frame = [1.0, 0.0, 0.0], [1.0, 2.0, 0.0], LinkFrame.of("foo")
+    robot, q = loaded(LIKE_OURS), [0.0, 0.0]
     for base in (None, BaseMotion()):
-        assert robot.placement([0.0, 0.0], "link:foo", base=base)[:3, 3].tolist() == [1.0, 2.0, 0.0]
-        assert robot.placement([0.0, 0.0], "link:link:foo", base=base)[:3, 3].tolist() == [1.0, 2.0, 0.0]
-        assert robot.placement([0.0, 0.0], "foo", base=base)[:3, 3].tolist() == [1.0, 0.0, 0.0]
-        assert robot.placement([0.0, 0.0], LinkFrame.of("foo"), base=base)[:3, 3].tolist() == [1.0, 0.0, 0.0]
+        for name, place in (("link:foo", other), ("link:link:foo", other), ("foo", foo), (frame, foo)):
+            assert robot.placement(q, name, base=base)[:3, 3].tolist() == place
     assert robot.certificate().verified
     robot = loaded(LIKE_OURS)
-    seen = robot.relative_placement([0.0, 0.0], "base", LinkFrame.of("foo"))
-    assert seen[:3, 3].tolist() == [-1.0, 0.0, 0.0]
-    assert robot.relative_placement([0.0, 0.0], "base", "link:foo")[:3, 3].tolist() == [-1.0, -2.0, 0.0]
+    assert robot.relative_placement(q, "base", frame)[:3, 3].tolist() == [-1.0, 0.0, 0.0]
+    assert robot.relative_placement(q, "base", "link:foo")[:3, 3].tolist() == [-1.0, -2.0, 0.0]
     assert robot.certificate().verified
 
 
@@ -67,8 +65,7 @@ def test_a_prepared_frame_is_not_taken_for_another_of_its_text() -> None:
     ways = "link:foo", LinkFrame.of("foo"), "link:foo"
     assert [robot.prepare(frame).placement(q)[1, 3] for frame in ways] == [2.0, 0.0, 2.0]
     assert [robot.placement(q, frame, verify=False)[1, 3] for frame in ways] == [2.0, 0.0, 2.0]
-    again = pickle.loads(pickle.dumps(robot.prepare(LinkFrame.of("foo"))))
-    assert again.placement(q)[1, 3] == 0.0
+    assert pickle.loads(pickle.dumps(robot.prepare(LinkFrame.of("foo")))).placement(q)[1, 3] == 0.0
 
 
 def test_every_frame_of_all_frames_stands_for_itself_also_in_a_validation() -> None:
@@ -78,8 +75,7 @@ def test_every_frame_of_all_frames_stands_for_itself_also_in_a_validation() -> N
     for copied in (copy.deepcopy(robot.all_frames), pickle.loads(pickle.dumps(robot.all_frames))):
         assert [robot.tree.frame_link(frame) for frame in copied] == [0, 1, 2, 1, 2]
     assert urdfkin.validate([LIKE_OURS.encode()], samples=2).passed
-    lines = judge(loaded(LIKE_OURS), samples=1).lines
-    assert max(line.pinocchio.worst for line in lines) < 10.0
+    assert max(line.pinocchio.worst for line in judge(loaded(LIKE_OURS), samples=1).lines) < 10.0
 
 
 @pytest.mark.parametrize("name", ["anymal_c", "so100", "z1", "b1_z1"])

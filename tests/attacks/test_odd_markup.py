@@ -1,6 +1,5 @@
 """Undeclared prefixes and remains of xacro: the robot is computed if its motion does not depend on them."""
 
-import warnings
 import xml.etree.ElementTree as Xml
 
 import pytest
@@ -9,7 +8,7 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.urdf.lint.cases.arm import MESH, arm
-from urdfkin.robot import Robot
+from tests.urdfs import loaded
 from urdfkin.urdf.lint import Finding, Severity
 from urdfkin.validation.accuracy import judge
 from urdfkin.view.scene import shapes
@@ -19,12 +18,6 @@ FOLLOWS = '<mimic joint="j1" multiplier="-2" offset="0.1"/>'
 SPHERE = '<link name="base"><visual><geometry><sphere radius="1"/></geometry></visual></link>'
 
 
-def load(text: str) -> Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        return urdfkin.load(text)
-
-
 def told(text: str) -> list[Finding]:
     return [finding for finding in urdfkin.check(text) if finding.code == UNDECLARED]
 
@@ -32,17 +25,18 @@ def told(text: str) -> list[Finding]:
 @pytest.mark.slow
 @pytest.mark.parametrize("more", ["<drake:x/>", '<gazebo drake:a="1"/>'])
 def test_a_follower_beside_an_undeclared_prefix_is_verified(more: str) -> None:
-    robot = load(arm(follow=FOLLOWS, more=more))
+    robot = loaded(arm(follow=FOLLOWS, more=more))
     T = robot.placement([0.3], "tool")
     assert robot.certificate().verified
-    assert (load(arm(follow=FOLLOWS)).placement([0.3], "tool") == T).all()
+    assert (loaded(arm(follow=FOLLOWS)).placement([0.3], "tool") == T).all()
 
 
 @pytest.mark.slow
 def test_the_judge_and_the_viewer_read_a_file_with_an_undeclared_prefix() -> None:
-    with_prefix, without = (judge(load(arm(follow=FOLLOWS, more=more)), samples=2) for more in ("<d:x/>", ""))
-    assert with_prefix.lines[0] == without.lines[0]
-    (shape,) = shapes(load(arm(base=SPHERE, more="<drake:x/>")))
+    robots = (loaded(arm(follow=FOLLOWS, more=more)) for more in ("<d:x/>", ""))
+    with_prefix, without = (judge(robot, samples=2).lines[0] for robot in robots)
+    assert with_prefix == without
+    (shape,) = shapes(loaded(arm(base=SPHERE, more="<drake:x/>")))
     assert (shape.link, shape.kind) == ("base", "sphere")
 
 
@@ -68,12 +62,8 @@ def test_a_prefix_that_is_declared_is_not_told(more: str) -> None:
 
 
 PARTS = [
-    '<gazebo xmlns:a="http://a">',
-    '<gazebo xmlns:b="http://b" a:u="1">',
-    "<a:x>",
-    "<b:x>",
-    '<x b:u="1">',
-]
+    '<gazebo xmlns:a="http://a">', '<gazebo xmlns:b="http://b" a:u="1">', "<a:x>", "<b:x>", '<x b:u="1">',
+]  # fmt: skip
 
 
 def _nested(parts: list[str]) -> str:
@@ -110,9 +100,7 @@ def test_it_is_told_whenever_readers_that_know_namespaces_refuse(parts: list[str
     ],
 )
 def test_a_robot_whose_motion_needs_no_xacro_is_loaded_and_verified(text: str) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)
-        robot = urdfkin.load(text)
+    robot = loaded(text)
     robot.placement([0.1, 0.2], "tool")
     assert robot.certificate().verified
 

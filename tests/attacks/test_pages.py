@@ -71,11 +71,8 @@ def _report(called: Callable[[str], str]) -> str:
     # As wide as each other: it stands beside a plot, whose ticks are as many as there is room for.
     whole["checks"][2] |= {"quantity": "<b>|`\x1b" if called is same else "abcdefghij"}
     failed["worst_case"] |= {"replay": called(NAMES["code"]), "frame": called(NAMES["line"])}
-    document |= {
-        "verdict": "disagrees",
-        "command": called(NAMES["code"]),
-        "started": called(NAMES["end of data"]),
-    }
+    document |= {"verdict": "disagrees", "command": called(NAMES["code"])}
+    document |= {"started": called(NAMES["end of data"])}
     document["versions"] = {key: called(NAMES["script"]) for key in document["versions"]}
     return json.dumps(document)
 
@@ -154,16 +151,10 @@ def test_a_table_in_markdown_has_the_same_elements_under_any_name(kind: str, htm
 
 @pytest.mark.parametrize("kind", NAMES)
 def test_a_name_in_markdown_is_code_and_prose_is_prose(kind: str) -> None:
-    name = NAMES[kind]
-    cell = rendered(f"| a | b |\n| --- | --- |\n| {markdown_code(name)} | x |\n", True)
-    assert [tag for tag, _ in cell.skeleton if tag in ("td", "code", "tr")] == [
-        "tr",
-        "tr",
-        "td",
-        "code",
-        "td",
-    ]
-    prose = rendered(markdown_text(name), True)
+    cell = rendered(f"| a | b |\n| --- | --- |\n| {markdown_code(NAMES[kind])} | x |\n", True)
+    tags = [tag for tag, _ in cell.skeleton if tag in ("td", "code", "tr")]
+    assert tags == ["tr", "tr", "td", "code", "td"]
+    prose = rendered(markdown_text(NAMES[kind]), True)
     assert prose.skeleton == [("p", ()), ("/p", ())]
     assert not re.search(r"@\w|://|www\.|#\d", prose.prose)
 
@@ -272,5 +263,4 @@ def test_a_drawing_has_names_as_words_alone() -> None:
 @pytest.mark.parametrize("name", ["J$$(x)", "$x^2$", "J$$", r"$\frac{", r"\$x$"])
 def test_dollars_in_a_name_are_no_mathematics(name: str) -> None:
     svg = etree.fromstring(drawing(table(name)).encode())
-    words = " ".join("".join(map(str, element.itertext())) for element in svg.iter("{*}text"))
-    assert name in words
+    assert name in " ".join("".join(map(str, element.itertext())) for element in svg.iter("{*}text"))

@@ -7,10 +7,9 @@ import ast
 import io
 import os
 import resource
-import subprocess
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ import pytest
 import urdfkin
 from tests.cli.running import refused
 from tests.cli.running import urdfkin as command
+from tests.cli.test_check_in_a_repository import commit, git, put
 from urdfkin.errors import SourceError
 from urdfkin.robot.trajectory import read_arrays
 from urdfkin.system import files
@@ -67,13 +67,10 @@ def _bounded() -> Iterator[None]:
 def _opens(source: str) -> bool:
     """Whether a module opens files by itself: by a method of a path, or by `open`."""
     for node in ast.walk(ast.parse(source)):
-        if not isinstance(node, ast.Call):
-            continue
-        if isinstance(node.func, ast.Name) and node.func.id == "open":
-            return True
-        if isinstance(node.func, ast.Attribute) and node.func.attr in _OPENING:
-            of = node.func.value
-            if not (isinstance(of, ast.Name) and of.id == "webbrowser"):
+        if isinstance(node, ast.Call):
+            function = ast.unparse(node.func)
+            method = "." in function and function.rpartition(".")[2] in _OPENING
+            if function == "open" or (method and not function.startswith("webbrowser.")):
                 return True
     return False
 
@@ -89,26 +86,22 @@ def test_no_module_but_the_reader_opens_files_that_a_stranger_may_have_put_there
 
 def odd_file(kind: str, path: Path) -> Path:
     """What is no regular file, or too large, at a path or elsewhere."""
-    if kind == "a device":
-        return Path("/dev/zero")
-    if kind == "a link to a device":
-        path.symlink_to("/dev/zero")
-    elif kind == "a pipe":
-        os.mkfifo(path)
-    elif kind == "a folder":
-        path.mkdir()
-    else:
-        path.write_bytes(bytes(xacro.MOST_ARGUMENTS + 1))
-    return path
+    make: dict[str, Callable[[], object]] = {
+        "a link to a device": lambda: path.symlink_to("/dev/zero"),
+        "a pipe": lambda: os.mkfifo(path),
+        "a folder": path.mkdir,
+        "a large file": lambda: path.write_bytes(bytes(xacro.MOST_ARGUMENTS + 1)),
+    }
+    make.get(kind, int)()
+    return Path("/dev/zero") if kind == "a device" else path
 
 
 @pytest.mark.parametrize("kind", ["a device", "a link to a device", "a pipe", "a folder"])
 def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
     path = odd_file(kind, tmp_path / "x")
+    words = r"not a regular file: found a (character device|pipe)|directory"
     for read in (read_bytes, read_if_there):
-        with pytest.raises(
-            SourceError, match=r"not a regular file: found a (character device|pipe)|directory"
-        ):
+        with pytest.raises(SourceError, match=words):
             read(path)
 
 
@@ -151,18 +144,16 @@ def test_a_stores_file_that_is_a_link_to_a_device_is_not_read(name: str, tmp_pat
     if name == "manifest.json":
         with pytest.raises(SourceError, match="not a regular file"):
             Store.reading(tmp_path, said.append)
-        return
-    if name == "chunk":
+    elif name == "chunk":
         assert Store.reading(tmp_path, said.append).answer(0, 0) is None
         assert "computed again" in said[0]
-        with pytest.warns(
-            StoreWarning, match="is damaged and is computed again: not a regular file: a character device"
-        ):
+        words = "is damaged and is computed again: not a regular file: a character device"
+        with pytest.warns(StoreWarning, match=words):
             assert validate("planar_two_link", samples=10, store=tmp_path).passed
         assert not place.is_symlink()
-        return
-    assert AccuracyResult.of(Store.reading(tmp_path, said.append)) is None
-    assert "no accuracy results" in said[0]
+    else:
+        assert AccuracyResult.of(Store.reading(tmp_path, said.append)) is None
+        assert "no accuracy results" in said[0]
 
 
 def test_a_stores_lock_or_folder_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path: Path) -> None:
@@ -243,19 +234,15 @@ def test_a_xacro_argument_without_a_name_and_a_value_is_refused(word: str, tmp_p
 def test_an_older_version_that_is_too_large_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def git(*words: str) -> None:
-        who = ("-c", "user.name=a", "-c", "user.email=a@b")
-        subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
-
-    git("init", "-b", "main")
-    (tmp_path / "arm.urdf").write_text("<robot/>" + " " * 1000)
-    git("add", "arm.urdf")
-    git("commit", "-m", "a")
+    monkeypatch.chdir(tmp_path)
+    git("init", "-q", "-b", "main")
+    arm = tmp_path / put("arm.urdf", "<robot/>" + " " * 1000)
+    commit()
     version = version_before("main", tmp_path)
-    assert version.read(tmp_path / "arm.urdf") is not None
+    assert version.read(arm) is not None
     monkeypatch.setattr("urdfkin.system.git.MOST", 1000)
     with pytest.raises(SourceError, match=r"arm\.urdf: too large in the older version: found 1008 bytes"):
-        version.read(tmp_path / "arm.urdf")
+        version.read(arm)
 
 
 # -- folders and meshes ---------------------------------------------------------------------------------

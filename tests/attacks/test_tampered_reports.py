@@ -150,8 +150,7 @@ def test_another_axis_or_place_is_told_as_a_change_of_the_robot(what: str, tmp_p
     else:
         joint["placement"][0][3] += 0.1
     old, new = written(arms(), tmp_path / "a.json"), written(document, tmp_path / "b.json")
-    done = good("report compare", str(old), str(new))
-    assert f"panda: joint {joint['name']}, {what}: " in done.text
+    assert f"panda: joint {joint['name']}, {what}: " in good("report compare", str(old), str(new)).text
 
 
 @pytest.mark.parametrize(

@@ -101,12 +101,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     entry["source"] = NAMES["colours"] + NAMES["line"]
     entry["checks"][0]["worst_case"]["replay"] = NAMES["colours"]
     refused = {
-        **entry,
-        "verdict": "bad input",
-        "reason": "\n".join(NAMES.values()),
-        "checks": [],
-        "model": None,
-    }
+        **entry, "verdict": "bad input", "reason": "\n".join(NAMES.values()), "checks": [], "model": None,
+    }  # fmt: skip
     report["robots"] += [refused | {"joints": [], "frames": [], "chains": [], "results": 0}]
     report["sha256"].append(None)
     report |= {"asked": 2, "verdict": "bad input", "reason": "1 of 2 robots has bad input"}
@@ -117,13 +113,10 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 def table_of(names: list[str]) -> str:
     rows = ", ".join(
-        f"{{joint = {_toml(name)}, kind = 'revolute', a = 0.1, alpha = 0, d = 0, theta = 0}}"
-        for name in names
+        f"{{joint = {_toml(x)}, kind = 'revolute', a = 0.1, alpha = 0, d = 0, theta = 0}}" for x in names
     )
-    return (
-        "convention = 'standard'\nangles = 'radians'\nlengths = 'metres'\n"
-        f"robot = {_toml(NAMES['colours'])}\nrows = [{rows}]\n"
-    )
+    units = "convention = 'standard'\nangles = 'radians'\nlengths = 'metres'\n"
+    return f"{units}robot = {_toml(NAMES['colours'])}\nrows = [{rows}]\n"
 
 
 def _toml(name: str) -> str:
@@ -295,14 +288,10 @@ def test_what_is_printed_goes_through_the_door() -> None:
         "__init__.py": ('click.echo(f"urdfkin {own_version()}, Pinocchio {version()',),
         "exit.py": ('click.echo("urdfkin: interrupted', 'click.echo("".join(traceback.', "click.echo("),
     }  # fmt: skip
-    folder = Path(__file__).parents[2] / "urdfkin" / "cli"
-    for path in folder.glob("*.py"):
+    way = r"\bclick\.echo\(|\bprint\(|Console\(|sys\.stdout\.write"
+    harmless_way = r"out\.print\(|def |super\(\)\.|_print\("
+    for path in (Path(__file__).parents[2] / "urdfkin" / "cli").glob("*.py"):
         lines = [line.strip() for line in path.read_text().splitlines()]
-        ways = [
-            line
-            for line in lines
-            if re.search(r"\bclick\.echo\(|\bprint\(|Console\(|sys\.stdout\.write", line)
-        ]
-        ways = [line for line in ways if not re.search(r"out\.print\(|def |super\(\)\.|_print\(", line)]
+        ways = [line for line in lines if re.search(way, line) and not re.search(harmless_way, line)]
         strange = [line for line in ways if not line.startswith(allowed.get(path.name, ()))]
         assert strange == [] or path.name == "terminal.py", (path.name, strange)

@@ -1,10 +1,9 @@
 """No robot takes a validation with it, whatever it raises; none is passed over in silence."""
 
 import os
-import resource
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -28,32 +27,31 @@ ROOT = Path(__file__).parents[2]
 
 
 #: The ways of running; what crosses the border between processes is odd enough.
-WAYS: dict[str, tuple[Callable[[], Any], Sequence[str]]] = {
-    "here": (dict, tuple(raising_worker.ERRORS)),
-    "executor": (lambda: {"executor": ThreadPoolExecutor(2)}, ["memory"]),
-    "jobs": (lambda: {"jobs": 2}, ["unpicklable", "pinocchio"]),
-    "isolate": (lambda: {"jobs": 2, "isolate": True}, ["unpicklable", "recursion"]),
+WAYS: dict[str, Callable[[], Any]] = {
+    "here": dict,
+    "executor": lambda: {"executor": ThreadPoolExecutor(2)},
+    "jobs": lambda: {"jobs": 2},
+    "isolate": lambda: {"jobs": 2, "isolate": True},
 }
+ERRORS = [*(("here", error) for error in raising_worker.ERRORS), ("executor", "memory"),
+          *(("jobs", error) for error in ("unpicklable", "pinocchio")),
+          *(("isolate", error) for error in ("unpicklable", "recursion"))]  # fmt: skip
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("way", "error"), [(way, error) for way, (_, errors) in WAYS.items() for error in errors]
-)
+@pytest.mark.parametrize(("way", "error"), ERRORS)
 def test_whatever_a_robot_raises_is_its_result_and_the_others_are_verified(
     way: str, error: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("URDFKIN_TEST_ERROR", error)
     monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.raising_worker")
     monkeypatch.setattr(answer, "run_chunk", raising_worker.raising)
-    report = validate(ROBOTS, samples=60, **WAYS[way][0]())
+    report = validate(ROBOTS, samples=60, **WAYS[way]())
     assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
     robot = report.robots[1]
-    assert robot.reason is not None
-    assert robot.reason.startswith("unexpected error in urdfkin, please report it: ")
-    assert raising_worker.WORDS[error] in robot.reason
-    assert robot.error is not None
-    assert "in raising" in robot.error
+    assert str(robot.reason).startswith("unexpected error in urdfkin, please report it: ")
+    assert raising_worker.WORDS[error] in str(robot.reason)
+    assert "in raising" in str(robot.error)
     assert report.as_dict()["robots"][1]["error"] == robot.error
     assert (report.passed, report.exit_code) == (False, 3)
 
@@ -220,18 +218,16 @@ def test_an_interrupt_keeps_what_had_finished_and_drops_what_waits(
 
     monkeypatch.setattr(engines, "IN_FLIGHT", 1)
     monkeypatch.setattr(answer, "run_chunk", interrupted)
-    report = validate(
-        ROBOTS, samples=60, executor=None if way == "here" else Refusing(10**6, when_asked=True)
-    )
+    executor = None if way == "here" else Refusing(10**6, when_asked=True)
+    report = validate(ROBOTS, samples=60, executor=executor)
     assert ran[-1] == ("ur5", 1)
-    assert report.interrupted
+    assert (report.interrupted, report.exit_code) == (True, 130)
     first, second, third = report.robots
     assert first.verdict is ValidationVerdict.VERIFIED
     assert (second.samples, second.verdict) == (28, ValidationVerdict.NOT_VERIFIED)
     assert second.reason == "interrupted: 28 of 63 samples were compared"
     assert (third.samples, third.results) == (0, 0)
     assert third.reason == "interrupted: 0 of 63 samples were compared"
-    assert report.exit_code == 130
 
 
 def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
@@ -250,23 +246,12 @@ def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
     assert [future.cancelled() for future in made] == [True, True, False]
 
 
-def _limited(descriptors: int) -> Callable[[], None]:
-    return lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))
-
-
-def _command(*words: str, **how: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "urdfkin", *words], capture_output=True, text=True, check=False, **how
-    )
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("descriptors", [6, 7, 8, 9, 12])
-def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: int, tmp_path: Path) -> None:
-    done = _command(
-        "validate", "double_pendulum", "ur5", "--isolate", "--jobs", "2", "--samples", "2",
-        preexec_fn=_limited(descriptors),
-    )  # fmt: skip
+def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: int) -> None:
+    words = "validate double_pendulum ur5 --isolate --jobs 2 --samples 2"
+    line = f"ulimit -n {descriptors}; exec {sys.executable} -m urdfkin {words}"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
     verified = sum(line.endswith("verified") and "not" not in line for line in done.stdout.splitlines())
     assert (done.returncode == 0) == (verified == 2), done.stdout + done.stderr
     assert done.returncode in (0, 2, 3, 70)
@@ -276,11 +261,9 @@ def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: 
 def test_robots_are_checked_from_a_folder_that_is_gone(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     gone.mkdir()
-    script = (
-        f"cd {gone} && rmdir {gone} && exec {sys.executable} -m urdfkin validate ur5 --isolate --samples 2"
-    )
-    path = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=False, env=path)
+    command = f"exec {sys.executable} -m urdfkin validate ur5 --isolate --samples 2"
+    script, env = f"cd {gone} && rmdir {gone} && {command}", os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=False, env=env)
     assert done.returncode == 0, done.stderr
     assert "1 robot, " in done.stdout
 

@@ -38,19 +38,12 @@ def _tables(monkeypatch: pytest.MonkeyPatch) -> Document:
 
 def _tables_without_numbers(monkeypatch: pytest.MonkeyPatch) -> Document:
     right = chains_module.chains_of
-    monkeypatch.setattr(
-        "urdfkin.validation.robot_summary.chains_of",
-        lambda *args: tuple(chain | {"share_of_bound": None, "worst": None} for chain in right(*args)),
-    )
+
+    def without(*args: Any) -> tuple[Any, ...]:
+        return tuple(chain | {"share_of_bound": None, "worst": None} for chain in right(*args))
+
+    monkeypatch.setattr(chains_module, "chains_of", without)
     return _made("ur5")
-
-
-def _refused(_: pytest.MonkeyPatch) -> Document:
-    return _made(chain([""] * 320, origin="", name="huge"))
-
-
-def _broken(_: pytest.MonkeyPatch) -> Document:
-    return _made('<robot name="r"><link name="a"/><link name="b"/></robot>')
 
 
 def _crashed(monkeypatch: pytest.MonkeyPatch) -> Document:
@@ -69,14 +62,14 @@ def _interrupted(_: pytest.MonkeyPatch) -> Document:
     return _made(["planar_two_link", "double_pendulum", "ur5"], samples=50, progress=stop)
 
 
-def _none(_: pytest.MonkeyPatch) -> Document:
-    return _made([])
-
-
 def _missing(_: pytest.MonkeyPatch) -> Document:
     document = arms()
     document |= {"asked": 3, "verdict": "not verified", "reason": "1 of 3 robots without a report"}
     return document
+
+
+HUGE = chain([""] * 320, origin="", name="huge")
+IN_TWO = '<robot name="r"><link name="a"/><link name="b"/></robot>'
 
 
 def _made(robots: Any, **how: Any) -> Document:
@@ -95,14 +88,14 @@ CASES: dict[str, tuple[Callable[[pytest.MonkeyPatch], Document], list[str], str,
     "tables, no number": (
         _tables_without_numbers, ["disagrees"], "disagree with Pinocchio: by an infinite amount", 1, (1, 0),
     ),
-    "refused": (_refused, ["not verified"], "memory grows with nv^3", 3, (1, 0)),
-    "bad input": (_broken, ["bad input"], "URDF", 2, (0, 1)),
+    "refused": (lambda _: _made(HUGE), ["not verified"], "memory grows with nv^3", 3, (1, 0)),
+    "bad input": (lambda _: _made(IN_TWO), ["bad input"], "URDF", 2, (0, 1)),
     "crash": (_crashed, ["not verified"], "please report it: MemoryError: no message", 3, (1, 0)),
     "interrupt": (
         _interrupted, ["verified", "not verified", "not verified"],
         "interrupted: 0 of 53 samples were compared", 130, (2, 1),
     ),
-    "nothing": (_none, [], "", 3, (0, 1)),
+    "nothing": (lambda _: _made([]), [], "", 3, (0, 1)),
     "missing": (_missing, ["verified", "verified"], "", 3, (0, 1)),
 }  # fmt: skip
 
@@ -173,8 +166,7 @@ def test_junit_tells_a_failure_from_an_error(monkeypatch: pytest.MonkeyPatch) ->
         ("refused", "failure", "not verified"),
         ("bad input", "error", "bad input"),
     ):
-        root = read(CASES[name][0](monkeypatch))
-        case = root.xpath("//testcase[@name='verdict']")
+        case = read(CASES[name][0](monkeypatch)).xpath("//testcase[@name='verdict']")
         assert isinstance(case, list)
         assert isinstance(case[0], etree._Element)
         (outcome,) = case[0]

@@ -36,8 +36,7 @@ def test_steps_run_after_a_failure_and_the_comparison_needs_its_two_files_alone(
 
 @pytest.mark.slow
 def test_the_key_of_the_kernels_names_all_that_they_depend_on_and_is_one(tmp_path: Path) -> None:
-    cache = steps()[index("actions/cache@")]
-    assert "steps.kernels.outputs.key" in cache["with"]["key"]
+    assert "steps.kernels.outputs.key" in steps()[index("actions/cache@")]["with"]["key"]
     told = steps()[index("pip freeze")]
     assert told["id"] == "kernels"
     assert "/proc/cpuinfo" in told["run"]

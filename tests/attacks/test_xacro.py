@@ -257,10 +257,8 @@ def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
 
     with socket.create_server(("127.0.0.1", 0)) as server:
         connected: list[object] = []
-        thread = threading.Thread(target=lambda: connected.append(server.accept()), daemon=True)
-        thread.start()
-        code = WORST.format(deed.replace("PORT", str(server.getsockname()[1])))
-        done = python(code, check=False)
+        threading.Thread(target=lambda: connected.append(server.accept()), daemon=True).start()
+        done = python(WORST.format(deed.replace("PORT", str(server.getsockname()[1]))), check=False)
     assert "RefusedError: " in done.stderr.splitlines()[-1]
     assert not connected
 

@@ -112,12 +112,6 @@ def imported(lines: Sequence[str], modules: Collection[str]) -> dict[str, list[s
 
 def process(*words: str, stdin: bytes = b"", cwd: Path | None = None, **env: str) -> Done:
     """`python -m urdfkin` in a process of its own."""
-    done = subprocess.run(
-        [sys.executable, "-m", "urdfkin", *words],
-        input=stdin,
-        cwd=cwd,
-        env={**os.environ, **env},
-        capture_output=True,
-        check=False,
-    )
+    command, env = [sys.executable, "-m", "urdfkin", *words], os.environ | env
+    done = subprocess.run(command, input=stdin, cwd=cwd, env=env, capture_output=True, check=False)
     return Done(done.returncode, done.stdout, done.stderr.decode())

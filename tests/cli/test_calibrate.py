@@ -1,6 +1,7 @@
 """`urdfkin calibrate` writes what it says, and refuses what has no effect."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,18 +15,21 @@ from urdfkin.dh.table import DHConvention
 from urdfkin.robot.loading import load
 
 
-def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
+def words_of(folder: Path, shift: int = 0) -> tuple[list[str], Any]:
+    """The words of a calibration, whose q are shifted by some rows, and the bench that was measured."""
     true = bench(BRANCHED, ("origins",), "hand", "trunk")
-    (tmp_path / "arm.urdf").write_text(BRANCHED)
-    np.savez(tmp_path / "poses.npz", q=true.q, T=true.T)
-    words = ["calibrate", f"{tmp_path}/arm.urdf", "--tip", "hand", "--poses", f"{tmp_path}/poses.npz"]
-    out = tmp_path / "new.urdf"
+    (folder / "arm.urdf").write_text(BRANCHED)
+    np.savez(folder / "poses.npz", q=np.roll(true.q, shift, axis=0), T=true.T)
+    return ["calibrate", f"{folder}/arm.urdf", "--tip", "hand", "--poses", f"{folder}/poses.npz"], true
+
+
+def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
+    (words, true), out = words_of(tmp_path), tmp_path / "new.urdf"
     done = good(*words, "--format", "json", "-o", str(out))
     assert done.data["rank"] == 14
     assert sum(one["fitted"] for one in done.data["parameters"]) == 14
     assert done.data["rms"]["after"]["metres"] < 1e-14
-    T = load(out).placement(true.q, "hand")
-    assert np.abs(T - true.T).max() < 1e-13
+    assert np.abs(load(out).placement(true.q, "hand") - true.T).max() < 1e-13
     assert "measured on the bench" in out.read_text()
     shown = urdfkin(*words)
     assert "14 of 18 parameters identifiable, 4 fixed" in shown.text
@@ -33,11 +37,7 @@ def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
 
 
 def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path: Path) -> None:
-    true = bench(BRANCHED, ("origins",), "hand", "trunk")
-    (tmp_path / "arm.urdf").write_text(BRANCHED)
-    np.savez(tmp_path / "poses.npz", q=np.roll(true.q, 1, axis=0), T=true.T)
-    out = tmp_path / "new.urdf"
-    words = ["calibrate", f"{tmp_path}/arm.urdf", "--tip", "hand", "--poses", f"{tmp_path}/poses.npz"]
+    (words, _), out = words_of(tmp_path, shift=1), tmp_path / "new.urdf"
     done = urdfkin(*words, "-o", str(out))
     assert done.code == 3
     assert "likeliest reason: q is shifted by one row relative to the poses" in done.err
@@ -46,8 +46,7 @@ def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path:
     data = urdfkin(*words, "--format", "json").data
     assert data["likeliest_reason"].startswith("q is shifted by one row")
     assert "of the reach" in data["objections"][0]
-    forced = good(*words, "--force", "-o", str(out))
-    assert "urdfkin: warning: " in forced.err
+    assert "urdfkin: warning: " in good(*words, "--force", "-o", str(out)).err
     assert out.exists()
 
 

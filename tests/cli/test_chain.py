@@ -21,8 +21,7 @@ PATHS = [
 def test_axes_and_origins_are_those_of_the_robots_own_frames(name: str, base: str, tip: str) -> None:
     robot = library.load(name)
     ends = ["--base", base, "--tip", tip] if base else []
-    done = good("chain", name, *ends, "--q", "random", "--seed", "3", "--format", "json")
-    data = done.data
+    data = good("chain", name, *ends, "--q", "random", "--seed", "3", "--format", "json").data
     q = np.array(data["q"])
     here = np.linalg.inv(robot.placement(q, data["base"]))
     values = dict(zip(robot.coordinate_names, q, strict=True))

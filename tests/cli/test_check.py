@@ -23,16 +23,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 #: A line, its exit code, and how its output begins or, after a star, what is in it.
 LINES = {
-    "good.urdf": (0, "no findings in 1 file\n"),
-    "warned.urdf": (0, "*URDF405"),
+    "good.urdf": (0, "no findings in 1 file\n"), "warned.urdf": (0, "*URDF405"),
     "--strict warned.urdf": (1, "*URDF405 error"),
-    "--ignore URDF402 bad.urdf": (0, "no findings in 1 file\n"),
-    "-": (1, "<stdin>:"),
-    "--format json bad.urdf good.urdf": (1, "*URDF402"),
-    "--format sarif bad.urdf good.urdf": (1, "*URDF402"),
-    "--format github good.urdf": (0, ""),
-    "--max-bytes 10 good.urdf": (1, "*URDF108"),
-}
+    "--ignore URDF402 bad.urdf": (0, "no findings in 1 file\n"), "-": (1, "<stdin>:"),
+    "--format json bad.urdf good.urdf": (1, "*URDF402"), "--format sarif bad.urdf good.urdf": (1, "*URDF402"),
+    "--format github good.urdf": (0, ""), "--max-bytes 10 good.urdf": (1, "*URDF108"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("line", LINES)
@@ -63,8 +59,7 @@ def test_an_error_exits_1_with_its_place_a_missing_file_or_an_unknown_code_2(fol
 
 
 def test_explain_prints_a_page_and_lists_all_codes() -> None:
-    page = good("explain urdf502")
-    assert page.text.startswith("URDF502 axis-without-direction (error)")
+    assert good("explain urdf502").text.startswith("URDF502 axis-without-direction (error)")
     assert urdfkin("explain").text.count("\n") > 60
     assert urdfkin("explain URDF999").code == 2
 
@@ -74,8 +69,7 @@ def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> Non
         "import sys; from urdfkin.urdf.lint import check; check('<robot/>');"
         "print({'numba', 'yourdfpy', 'pinocchio', 'lxml', 'trimesh'} & set(sys.modules))"
     )
-    done = python(program)
-    assert done.stdout == "set()\n"
+    assert python(program).stdout == "set()\n"
 
 
 NAMES = [b"r\xff\xe9.urdf", b"a b:c%41?#\\[].urdf", "ä\u202e.urdf".encode(), b"a\nb.urdf"]
@@ -96,8 +90,7 @@ def test_a_file_of_any_name_is_named_by_a_uri_that_gives_its_bytes_back(
     done = urdfkin("check --format sarif", os.fsdecode(given))
     assert done.code == 1, done.err
     (result,) = done.data["runs"][0]["results"]
-    uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
-    parts = urlsplit(uri)
+    parts = urlsplit(result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"])
     assert PATH.fullmatch(parts.path)
     assert (parts.scheme, parts.netloc) == ("file" if absolute else "", "")
     assert (parts.query, parts.fragment) == ("", "")

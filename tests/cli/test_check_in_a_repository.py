@@ -333,39 +333,41 @@ def Xform "a" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {
 def Xform "b" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {
 }
 """
-MJCF = """<mujoco><worldbody><body name="a"><joint name="j"/><geom size="1"/>{}</body></worldbody>
-<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon></mujoco>"""
+MJCF = """<mujoco><worldbody><body name="a"><joint name="j"/><geom size="1"/><include file="part.xml"/></body>
+</worldbody><tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon></mujoco>"""
+SITE = '<mujocoinclude><site name="tip"/></mujocoinclude>'
+
+
+#: A file, its text, its part, the part's text before and after, and the findings.
+IN_PARTS = {
+    "usd": ("arm.usda", STAGE, "parts.usda", PARTS, PARTS + "\n", ["USD301", "USD302"]),
+    "mjcf": ("arm.xml", MJCF, "part.xml", SITE, SITE + "\n", ["MJCF101", "MJCF102"]),
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", ["usd", "mjcf"])
+@pytest.mark.parametrize("form", IN_PARTS)
 def test_a_usd_or_mjcf_file_is_told_in_full_when_it_or_a_part_of_it_changed(
     repository: Path, form: str
 ) -> None:
     pytest.importorskip("pxr" if form == "usd" else "mujoco")
-    if form == "usd":
-        put("arm.usda", STAGE)
-        put("parts.usda", PARTS)
-        file, part, changed, expected = "arm.usda", "parts.usda", PARTS + "\n", ["USD301", "USD302"]
-    else:
-        put("arm.xml", MJCF.format('<include file="part.xml"/>'))
-        part, changed = "part.xml", '<mujocoinclude><site name="tip"/></mujocoinclude>\n'
-        put(part, changed.strip())
-        file, expected = "arm.xml", ["MJCF101", "MJCF102"]
+    file, text, part, before, after, expected = IN_PARTS[form]
+    put(file, text)
+    put(part, before)
 
-    def told(name: str) -> list[str]:
-        return [code for _, code in found("--changed-since", "HEAD", name)]
+    def told() -> list[str]:
+        return [code for _, code in found("--changed-since", "HEAD", file)]
 
-    assert told(file) == expected
+    assert told() == expected
     commit()
-    assert told(file) == []
+    assert told() == []
     assert "(unchanged files: 1)" in check("--changed-since", "HEAD", file).text
-    put(part, changed)
-    assert told(file) == expected
+    put(part, after)
+    assert told() == expected
     git("checkout", "-q", part)
-    assert told(file) == []
-    put(file, Path(file).read_text() + "\n")
-    assert told(file) == expected
+    assert told() == []
+    put(file, text + "\n")
+    assert told() == expected
 
 
 @pytest.mark.slow
@@ -434,15 +436,14 @@ def test_fix_mends_files_and_what_is_left_is_told(here: Path) -> None:
 
 def test_only_what_is_told_is_mended(here: Path) -> None:
     text = LONG.replace("<parent", '<parent frame="x"')
+    mended = text.replace("0 0 2", "0 0 1")
     arm = put("arm.urdf", text)
     check("--select", "URDF503", "--fix")
-    assert arm.read_text() == text.replace("0 0 2", "0 0 1")
+    assert arm.read_text() == mended
     check("--write-baseline", "known.json")
     check("--baseline", "known.json", "--fix")
-    assert arm.read_text() == text.replace("0 0 2", "0 0 1")
-    silenced = text.replace("<parent", "<!-- urdfkin: ignore[208] wanted --><parent").replace(
-        "0 0 2", "0 0 1"
-    )
+    assert arm.read_text() == mended
+    silenced = mended.replace("<parent", "<!-- urdfkin: ignore[208] wanted --><parent")
     arm.write_text(silenced)
     check("--fix")
     assert arm.read_text() == silenced
@@ -461,40 +462,36 @@ def test_diff_shows_a_patch_that_does_what_fix_does(here: Path) -> None:
 
 
 ODD_LINES = {
-    name: text.encode()
-    for name, text in {
-        "line feeds": LONG,
-        "carriage returns": LONG.replace("\n", "\r\n"),
-        "one carriage return": LONG.replace("\n", "\r\n", 1),
-        "a lone carriage return": LONG.replace("    <axis", "   \r <axis"),
-        "no final line feed": LONG.removesuffix("\n"),
-        "no final line feed, a fix on the last line": LONG.replace("\n", " ").strip(),
-        "a bidi mark nearby": LONG.replace('"b"', '"b\u202e"'),
-        "an escape for a CI service": LONG.replace("  </joint>", "  </joint>\n::error::x\n##[group]"),
-        "a form feed and a line separator": LONG.replace("<axis", "<!--\u2028 \x85--><axis"),
-        "a byte order mark": "\ufeff" + LONG,
-        "umlauts": LONG.replace('"r"', '"r\xe4"'),
-        "carriage returns, no final one": LONG.replace("\n", "\r\n").replace('"b"', '"b\u202e"').rstrip(),
-    }.items()
+    "line feeds": LONG,
+    "carriage returns": LONG.replace("\n", "\r\n"),
+    "one carriage return": LONG.replace("\n", "\r\n", 1),
+    "a lone carriage return": LONG.replace("    <axis", "   \r <axis"),
+    "no final line feed": LONG.removesuffix("\n"),
+    "no final line feed, a fix on the last line": LONG.replace("\n", " ").strip(),
+    "a bidi mark nearby": LONG.replace('"b"', '"b\u202e"'),
+    "an escape for a CI service": LONG.replace("  </joint>", "  </joint>\n::error::x\n##[group]"),
+    "a form feed and a line separator": LONG.replace("<axis", "<!--\u2028 \x85--><axis"),
+    "a byte order mark": "\ufeff" + LONG,
+    "umlauts": LONG.replace('"r"', '"r\xe4"'),
+    "carriage returns, no final one": LONG.replace("\n", "\r\n").replace('"b"', '"b\u202e"').rstrip(),
 }
 
 
 @pytest.mark.parametrize("name", ["arm.urdf", "an arm.urdf", "\xe4rm.urdf", 'ar"m.urdf', "below/arm.urdf"])
-@pytest.mark.parametrize("lines", list(ODD_LINES))
+@pytest.mark.parametrize("lines", ODD_LINES)
 def test_git_applies_what_diff_prints_and_it_does_what_fix_does(here: Path, lines: str, name: str) -> None:
-    arm = put(name)
-    arm.write_bytes(ODD_LINES[lines])
+    arm, odd = put(name), ODD_LINES[lines].encode()
+    arm.write_bytes(odd)
     done = check("--diff", str(arm) if name != "arm.urdf" else str(arm.resolve()))
     assert done.code == 1, done.text
-    shown = done.out.decode()
-    assert "\u202e" not in shown
-    assert not re.search(r"^\s*::|##\[", shown, re.MULTILINE)
+    assert "\u202e" not in done.text
+    assert not re.search(r"^\s*::|##\[", done.text, re.MULTILINE)
     subprocess.run(["git", "init", "-q"], check=True)
     subprocess.run(["git", "apply", "--whitespace=nowarn"], input=done.out, check=True, capture_output=True)
     patched = arm.read_bytes()
-    arm.write_bytes(ODD_LINES[lines])
+    arm.write_bytes(odd)
     check("--fix", str(arm))
-    assert patched == arm.read_bytes() != ODD_LINES[lines]
+    assert patched == arm.read_bytes() != odd
 
 
 def test_a_patch_that_is_printed_below_the_top_of_a_repository_is_applied_there(
@@ -503,7 +500,7 @@ def test_a_patch_that_is_printed_below_the_top_of_a_repository_is_applied_there(
     subprocess.run(["git", "init", "-q"], check=True)
     for k, lines in enumerate(("line feeds", "a bidi mark nearby")):
         arm = put(f"robots/arm{k}.urdf")
-        arm.write_bytes(ODD_LINES[lines])
+        arm.write_bytes(ODD_LINES[lines].encode())
         monkeypatch.chdir("robots")
         done = check("--diff", arm.name)
         subprocess.run(["git", "apply"], input=done.out, check=True, capture_output=True)
@@ -518,8 +515,7 @@ def test_fixes_that_turn_a_joint_wait_for_unsafe_fixes(here: Path) -> None:
         "--unsafe-fixes also fixes 1 finding, but rotates joints by more than a rounding error"
         in check().text
     )
-    done = check("--diff")
-    assert done.err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
+    assert check("--diff").err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
     check("--fix")
     assert arm.read_text() == text.replace("0 0 2", "0 0 1")
     assert "--unsafe-fixes does nothing without --fix and --diff" in check("--unsafe-fixes").err

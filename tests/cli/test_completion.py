@@ -6,7 +6,6 @@ import pty
 import re
 import select
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -16,7 +15,7 @@ import pytest
 
 import urdfkin as library
 from tests.attacks.hostile import IN_XML, chain_of_all
-from tests.cli.running import urdfkin
+from tests.cli.running import python, urdfkin
 from urdfkin.cli import commands
 from urdfkin.dh.parse_table import references
 from urdfkin.kinematics.registry import equations
@@ -64,16 +63,15 @@ def test_robots_are_files_and_the_catalogues_names(offered: Offered, line: str) 
 
 
 @pytest.mark.parametrize(
-    "words",
-    ["jacobian ROBOT --frame", "placement ROBOT --relative-to", "dh ROBOT --tip", "chain ROBOT --base"],
+    "words", ["jacobian {} --frame", "placement {} --relative-to", "dh {} --tip", "chain {} --base"]
 )
 def test_frames_are_those_of_the_robot_on_the_line(offered: Offered, words: str, tmp_path: Path) -> None:
     own = tmp_path / "own.urdf"
     own.write_text(library.load("planar_two_link", verify=False).urdf)
     for source in ("panda", str(own)):
         names = set(library.load(source, verify=False).frame_names)
-        assert set(offered(f"{words.replace('ROBOT', source)} ")) == names
-    assert offered(f"{words.replace('ROBOT', 'panda')} panda_lef") == ["panda_leftfinger"]
+        assert set(offered(f"{words.format(source)} ")) == names
+    assert offered(f"{words.format('panda')} panda_lef") == ["panda_leftfinger"]
 
 
 def test_frames_of_an_mjcf_file_are_its_bodies_sites_and_joints(offered: Offered, tmp_path: Path) -> None:
@@ -117,13 +115,11 @@ def test_what_cannot_be_read_offers_nothing_and_says_nothing(
 def test_completing_imports_nothing_heavy() -> None:
     env = {"_URDFKIN_COMPLETE": "bash_complete", "COMP_CWORD": "4"}
     env["COMP_WORDS"] = "urdfkin jacobian talos --frame arm_left_1"
-    code = (
+    done = python(
         "import sys\nfrom urdfkin.cli import main\nsys.argv = ['urdfkin']\n"
-        "try: main()\nfinally: print({'numpy', 'numba', 'pinocchio', 'yourdfpy', 'rich'} & set(sys.modules))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=os.environ | env, capture_output=True, text=True, check=False
-    )
+        "try: main()\nfinally: print({'numpy', 'numba', 'pinocchio', 'yourdfpy', 'rich'} & set(sys.modules))",
+        env=os.environ | env, check=False,
+    )  # fmt: skip
     assert done.stdout.splitlines()[:2] == ["plain,arm_left_1_link", "plain,arm_left_1_joint"]
     assert done.stdout.endswith("set()\n")
 

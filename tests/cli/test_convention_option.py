@@ -110,19 +110,16 @@ def test_a_file_without_a_joint_or_with_two_columns_of_one_name_is_one_error(
 
 def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
     """Nothing can cost time that does not run: no module is loaded, in a process of its own."""
-    words = ["velocity", "a1", "--q", "random:100", "--v", "random", "--format", "csv"]
-    code = (
+    done = python(
         "import sys\nfrom tests.cli.running import urdfkin\n"
-        f"done = urdfkin(*{words})\n"
+        "done = urdfkin('velocity a1 --q random:100 --v random --format csv')\n"
         "loaded = [name for name in sys.modules if name.startswith('urdfkin.model.conventions')]\n"
         "print(done.code, len(done.text.splitlines()) > 100, loaded)\n"
     )
-    done = python(code)
     assert done.stdout == "0 True []\n"
 
 
 # -- urdfkin order ---------------------------------------------------------------------------------
-
 
 TOOLS = [name for name in BUILT_IN if name != "idyntree"]
 
@@ -160,18 +157,10 @@ def test_tools_with_the_same_indices_share_a_column_and_json_has_the_librarys_nu
 def test_the_printed_code_converts(start: str, end: str) -> None:
     text = run("order tiago --from", start, "--to", end, "--root-joint", "floating").text
     robot = urdfkin.load("tiago", root_joint="floating", verify=False)
-    rng = np.random.default_rng(0)
-    q, v = robot.sample(1)[0], rng.standard_normal(robot.nv)
-    q_from, v_from = robot.convention(start).to(q, v)
-    space: dict[str, Any] = {
-        "q_from": q_from,
-        "v_from": v_from,
-        "np": np,
-        "robot": robot,
-        "six_from": np.arange(6),
-    }
+    q, v = robot.sample(1)[0], np.random.default_rng(0).standard_normal(robot.nv)
+    space: dict[str, Any] = {"np": np, "robot": robot, "six_from": np.arange(6)}
+    space["q_from"], space["v_from"] = robot.convention(start).to(q, v)
     exec(text, space)
-    q_to, v_to = robot.convention(end).to(q, v)
-    assert np.allclose(space["q_to"], q_to, 0, 1e-14)
-    assert np.allclose(space["v_to"], v_to, 0, 1e-14)
+    for name, expected in zip(("q_to", "v_to"), robot.convention(end).to(q, v), strict=True):
+        assert np.allclose(space[name], expected, 0, 1e-14)
     assert ("six_to" in text) == ((start == "drake") != (end == "drake"))

@@ -1,11 +1,10 @@
 """`urdfkin dh` prints tables with their check, converts them, and exits with what it found."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from tests.cli.running import Done, urdfkin
+from tests.cli.running import Done, good, urdfkin
 from urdfkin.cli.dh import FORMATS
 from urdfkin.dh.export import FORMATS as EXPORTED
 
@@ -17,16 +16,14 @@ def run(*words: str) -> Done:
 
 
 def test_the_table_is_printed_with_its_check_in_the_forms_of_the_package() -> None:
-    result = run(*UR5, "--snap", "1e-6", "--degrees", "--millimetres")
-    assert result.code == 0
-    assert "ur5: base to tool0, standard Denavit-Hartenberg parameters" in result.text
-    assert "2  shoulder_lift_joint     -425            0       0           q2" in result.text
-    assert "guaranteed" in result.text
-    assert "agrees within rounding and snapping" in result.text
+    text = good("dh", *UR5, "--snap", "1e-6", "--degrees", "--millimetres").text
+    assert "ur5: base to tool0, standard Denavit-Hartenberg parameters" in text
+    assert "2  shoulder_lift_joint     -425            0       0           q2" in text
+    assert "guaranteed" in text
+    assert "agrees within rounding and snapping" in text
     assert set(FORMATS) == {*EXPORTED, "urdf", "svg"}
     result = run(*UR5, "--no-verify")
-    assert result.code == 3
-    assert "NOT VERIFIED" in result.text
+    assert (result.code, "NOT VERIFIED" in result.text) == (3, True)
     page = (Path(__file__).parents[2] / "docs" / "dh.md").read_text()
     command, shown = page.split("```console\n$ urdfkin dh ")[1].split("```")[0].split("\n", 1)
     assert run(*command.split()).text.startswith(shown)
@@ -37,50 +34,40 @@ def test_the_table_is_printed_with_its_check_in_the_forms_of_the_package() -> No
 def test_every_form_is_written(form: str, tmp_path: Path) -> None:
     if form == "svg":
         pytest.importorskip("matplotlib")
-    file = tmp_path / "table"
-    result = run(*UR5, "--format", form, "--snap", "1e-6", "-o", str(file))
-    assert result.code == 0
-    assert "ur5" in file.read_text()
+    good("dh", *UR5, "--format", form, "--snap", "1e-6", "-o", str(tmp_path / "table"))
+    assert "ur5" in (tmp_path / "table").read_text()
 
 
 @pytest.mark.slow
 def test_a_written_table_is_taken_back_and_converted(tmp_path: Path) -> None:
-    file = tmp_path / "arm.toml"
-    run(*UR5, "--snap", "1e-6", "--format", "toml", "-o", str(file))
-    result = run(str(file), "--convention", "modified")
-    assert result.code == 0
-    assert "base to tool0, modified" in result.text
-    assert "3  elbow_joint" in result.text
-    assert run(*UR5, "--compare", str(file)).code == 0
-    urdf = run(str(file), "--format", "urdf").text
-    assert urdf.startswith('<robot name="ur5"')
+    file = str(tmp_path / "arm.toml")
+    run(*UR5, "--snap", "1e-6", "--format", "toml", "-o", file)
+    text = good("dh", file, "--convention", "modified").text
+    assert "base to tool0, modified" in text
+    assert "3  elbow_joint" in text
+    assert run(*UR5, "--compare", file).code == 0
+    assert run(file, "--format", "urdf").text.startswith('<robot name="ur5"')
 
 
 def test_a_table_for_each_leaf() -> None:
-    result = run("solo12", "--all")
-    assert result.code == 0
-    assert result.text.count("standard Denavit-Hartenberg parameters") == 4
-    documents = json.loads(run("solo12", "--all", "--format", "json").text)
+    assert good("dh solo12 --all").text.count("standard Denavit-Hartenberg parameters") == 4
+    documents = run("solo12", "--all", "--format", "json").data
     assert [one["tip_frame"] for one in documents] == ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"]
     assert all("agrees within rounding" in one["checked"] for one in documents)
 
 
 @pytest.mark.parametrize("form", ["terminal", "markdown", "csv", "json"])
 def test_the_whole_tree_as_one_table(form: str) -> None:
-    result = run("solo12", "--tree", "--format", form)
-    assert result.code == 0
+    result = good("dh solo12 --tree --format", form)
     assert "eps*scale" in result.text + result.err
     assert "FL_HFE" in result.text
 
 
 @pytest.mark.slow
-def test_a_comparison_exits_with_its_verdict(tmp_path: Path) -> None:
-    same = run("ur5", "--compare", "ur5")
-    assert same.code == 0
-    assert "agrees exactly" in same.text
-    wrong = run("ur5", "--compare", "ur3", "--base", "base", "--tip", "tool0")
-    assert wrong.code == 1
-    assert "DIFFERS" in wrong.text
-    data = json.loads(run("kinova", "--compare", "kinova", "--format", "json").text)
+def test_a_comparison_exits_with_its_verdict() -> None:
+    assert "agrees exactly" in good("dh ur5 --compare ur5").text
+    wrong = urdfkin("dh ur5 --compare ur3 --base base --tip tool0")
+    assert (wrong.code, "DIFFERS" in wrong.text) == (1, True)
+    data = urdfkin("dh kinova --compare kinova --format json").data
     assert data["agrees"]
     assert [one["cell"] for one in data["differences"]] == ["d"]

@@ -14,20 +14,15 @@ from tests.cli.running import good, urdfkin
 @pytest.mark.slow
 def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
     path = tmp_path / "elbow.py"
-    words = ("--to", "numpy", "--quantity", "jacobian,velocity", "--quantity", "placement", "-o", str(path))
-    done = urdfkin("export planar_two_link", *words)
+    words = "export planar_two_link --to numpy --quantity jacobian,velocity --quantity placement -o"
+    done = urdfkin(words, str(path))
     assert (done.code, done.out) == (0, b"")
     assert "verified by Pinocchio" in done.err
-    checked = good("export --check", str(path))
-    assert re.findall(r"^good (\w+): 4 test vectors", checked.text, re.MULTILINE) == [
-        "jacobian",
-        "velocity",
-        "placement",
-    ]
+    checked = re.findall(r"^good (\w+): 4 test vectors", good("export --check", str(path)).text, re.MULTILINE)
+    assert checked == ["jacobian", "velocity", "placement"]
     path.write_text(path.read_text("utf-8").replace("cos(q_", "sin(q_"), "utf-8")
     wrong = urdfkin("export --check", str(path))
-    assert wrong.code == 1
-    assert "WRONG placement" in wrong.text
+    assert (wrong.code, "WRONG placement" in wrong.text) == (1, True)
 
 
 def test_standard_output_has_the_file_and_commands_nobody() -> None:
@@ -40,12 +35,10 @@ def test_standard_output_has_the_file_and_commands_nobody() -> None:
 
 def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
     path = tmp_path / "arm.py"
-    done = urdfkin("export planar_two_link --no-verify --to numpy -o", str(path))
-    assert done.code == 3
+    assert urdfkin("export planar_two_link --no-verify --to numpy -o", str(path)).code == 3
     assert "UNVERIFIED" in path.read_text("utf-8").splitlines()[0]
     checked = urdfkin("export --check", str(path))
-    assert checked.code == 3
-    assert "UNVERIFIED" in checked.err
+    assert (checked.code, "UNVERIFIED" in checked.err) == (3, True)
 
 
 @pytest.fixture(scope="module")
@@ -122,8 +115,7 @@ def test_octave_is_told_the_functions_name_and_never_the_files(
     )
     octave.chmod(0o700)
     monkeypatch.setenv("PATH", f"{octave.parent}:{os.environ['PATH']}")
-    text = urdfkin("export planar_two_link --to matlab --quantity placement").text
-    path.write_text(text, "utf-8")
+    path.write_text(urdfkin("export planar_two_link --to matlab --quantity placement").text, "utf-8")
     assert urdfkin("export --check", str(path)).code == 0
     assert (tmp_path / "said").read_text().splitlines()[-1] == "planar_two_link_tip_kinematics().check();"
     assert (tmp_path / "there").read_text() == "planar_two_link_tip_kinematics.m\n"

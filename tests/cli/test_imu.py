@@ -2,9 +2,7 @@
 
 import csv
 import io
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,10 +12,6 @@ from tests.cli.running import good, refused, urdfkin
 from tests.cli.test_trajectory_option import write
 from tests.laws.test_imu import moving_base
 from urdfkin.model.tree import FloatArray
-
-
-def save(path: Path, **arrays: Any) -> None:
-    np.savez(path, **arrays)
 
 
 @pytest.fixture
@@ -33,11 +27,11 @@ def test_a_csv_file_and_an_archive_of_the_same_motion_give_the_librarys_numbers(
     robot = library.load("ur5")
     q, v, a = (motion[x] for x in "qva")
     expected = robot.imu(q, v, a, "tool0", gravity=[0.0, 1.0, -9.8])
-    save(tmp_path / "log.npz", **motion)
+    np.savez(tmp_path / "log.npz", **motion)  # type: ignore[arg-type]
     write(tmp_path / "log.csv", robot, motion)
     for log in ("log.csv", "log.npz"):
         words = ["imu ur5 --frame tool0 --gravity 0,1,-9.8 --trajectory", str(tmp_path / log)]
-        document = json.loads(urdfkin(*words, "--format", "json").out)
+        document = urdfkin(*words, "--format", "json").data
         assert (document["result"], document["t"]) == (expected.tolist(), motion["t"].tolist())
         assert (document["quantity"], document["verified"]) == ("imu", True)
         rows = list(csv.reader(io.StringIO(urdfkin(*words, "--format", "csv").text)))
@@ -51,17 +45,15 @@ def test_a_csv_file_and_an_archive_of_the_same_motion_give_the_librarys_numbers(
 def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_are_none(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
-    base = moving_base(4, 3)
+    base, path = moving_base(4, 3), tmp_path / "log.npz"
     fields = {f"base_{name}": getattr(base, name) for name in ("placement", "velocity", "acceleration")}
-    path = tmp_path / "log.npz"
-    save(path, **motion, **fields)
-    words = ["imu", "ur5", "--frame", "tool0", "--trajectory", str(path), "--format", "json"]
+    np.savez(path, **motion, **fields)  # type: ignore[arg-type]
+    words = ["imu ur5 --frame tool0 --format json --trajectory", str(path)]
     q, v, a = (motion[x] for x in "qva")
     expected = library.load("ur5").imu(q, v, a, "tool0", base=base)
-    assert json.loads(urdfkin(*words).out)["result"] == expected.tolist()
-    save(path, q=motion["q"])
-    done = good(*words)
-    assert "rates by central differences" in done.err
+    assert urdfkin(*words).data["result"] == expected.tolist()
+    np.savez(path, q=motion["q"])
+    assert "rates by central differences" in good(*words).err
 
 
 @pytest.mark.parametrize(
@@ -84,7 +76,7 @@ def test_an_archive_of_anything_else_is_refused_in_one_line(
     arrays: dict[str, FloatArray], words: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.npz"
-    save(path, **arrays)
+    np.savez(path, **arrays)  # type: ignore[arg-type]
     err = refused("imu ur5 --trajectory", str(path))
     assert words in err
     assert str(path) in err
@@ -101,10 +93,9 @@ def test_what_is_no_archive_is_refused_too(data: bytes, tmp_path: Path) -> None:
 def test_options_without_effect_and_half_a_vector_are_refused(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
-    save(tmp_path / "log.npz", **motion)
-    assert "--v does nothing along a --trajectory" in refused(
-        "imu ur5 --trajectory", str(tmp_path / "log.npz"), "--v", "random"
-    )
+    np.savez(tmp_path / "log.npz", **motion)  # type: ignore[arg-type]
+    err = refused("imu ur5 --v random --trajectory", str(tmp_path / "log.npz"))
+    assert "--v does nothing along a --trajectory" in err
     assert "none for z" in urdfkin("imu ur5 --gravity 0,9.81").err
     assert urdfkin("imu ur5 --no-verify").code == 3
 
@@ -115,7 +106,7 @@ def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -
     q = robot.sample(3, 0)
     found = robot.singular_values(q, "panda_hand", "linear")
     gradient = found.manipulability_gradient(robot.hessian(q, "panda_hand"))
-    document = json.loads(urdfkin(*words, "--format", "json").out)
+    document = urdfkin(*words, "--format", "json").data
     assert document["q"] == q.tolist()
     assert document["singular_values"]["lower"] == found.values.lower.tolist()
     assert document["condition"]["upper"] == found.condition.upper.tolist()
@@ -134,7 +125,7 @@ def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -
 
 def test_what_is_no_number_is_null_in_json() -> None:
     words = ["singular-values", "planar_two_link", "--rows", "linear", "--q", "0.3,0", "--format", "json"]
-    document = json.loads(urdfkin(*words).out)
+    document = urdfkin(*words).data
     assert document["condition"]["upper"] == [None]
     assert document["manipulability_gradient"] == [[None, None]]
     assert [one["rank"] for one in document["singularities"]] == [1]

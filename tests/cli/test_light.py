@@ -3,7 +3,6 @@
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -45,8 +44,7 @@ def installed() -> list[str]:
 
 
 def bare(*words: str) -> subprocess.CompletedProcess[str]:
-    code = BARE.format(words=words, installed=installed())
-    return python(code, check=False)
+    return python(BARE.format(words=words, installed=installed()), check=False)
 
 
 @pytest.mark.parametrize("style", ["terminal", "json", "sarif", "github"])
@@ -91,7 +89,4 @@ finally:
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one processor")
 def test_numpys_linear_algebra_starts_no_threads_in_a_command() -> None:
     plain = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
-    done = subprocess.run(
-        [sys.executable, "-c", COUNTED], capture_output=True, text=True, check=True, env=plain
-    )
-    assert done.stdout.splitlines()[-1] == "1"
+    assert python(COUNTED, env=plain).stdout.splitlines()[-1] == "1"

@@ -174,8 +174,8 @@ def test_a_report_that_must_not_be_written_is_refused_before_the_work(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr("tempfile.NamedTemporaryFile", refuse)
-    for words in (["validate", "ur5", "--json", "r.json"], ["jacobian", "ur5", "-o", "J.csv"]):
-        err = refused(*words[:-1], str(tmp_path / words[-1]))
+    for line in ("validate ur5 --json", "jacobian ur5 -o"):
+        err = refused(line, str(tmp_path / "J.csv"))
         assert "cannot be written: found Permission denied" in err
         assert err.count("\n") == 1
 

@@ -16,33 +16,19 @@ STANDING = CampaignProgress(
 )
 
 
-class Clock:
-    """Stands where it is put."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
-def test_what_was_kept_or_compiled_before_makes_nobody_fast_or_slow() -> None:
-    clock = Clock()
-    pace = Pace(clock)
+@pytest.mark.parametrize("compiling", [0.0, 90.0])
+def test_what_was_kept_or_compiled_before_makes_nobody_fast_or_slow(compiling: float) -> None:
+    now = [100.0]
+    pace = Pace(lambda: now[0])
+    now[0] += compiling
     assert pace.of(replace(STANDING, chunks_done=10)) == (None, None)
-    clock.now += 5.0
+    now[0] += 5.0
     assert pace.of(STANDING) == (4.0, 128.5)
     assert line(STANDING, pace) == (
         "2 of 68 robots, 30 of 544 chunks (10 from an earlier run); 4 chunks/s, 2 min 8 s left, none"
         " failed; panda"
     )
     assert "3 failed" in line(replace(STANDING, failures=3), pace)
-    clock = Clock()
-    pace = Pace(clock)
-    clock.now += 90.0
-    assert pace.of(replace(STANDING, chunks_done=10)) == (None, None)
-    clock.now += 5.0
-    assert pace.of(STANDING) == (4.0, 128.5)
 
 
 def test_programs_are_told_in_json_from_before_any_work_to_the_last_chunk() -> None:

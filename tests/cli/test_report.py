@@ -74,16 +74,13 @@ def test_the_judge_says_that_the_base_moved_where_it_was_told_to(tmp_path: Path)
 
 @pytest.mark.slow
 def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> None:
-    first = [tmp_path / f"first.{ending}" for ending in ("html", "xml", "md")]
-    later = [tmp_path / f"later.{ending}" for ending in ("html", "xml", "md")]
-    data = tmp_path / "a.json"
-    forms = ("--html", "--junit", "--markdown")
-    words = [word for pair in zip(forms, first, strict=True) for word in pair]
-    urdfkin("validate", "planar_two_link", "--samples", "3", "--json", data, *words)
-    words = [word for pair in zip(forms, later, strict=True) for word in pair]
-    done = urdfkin("report", data, *words)
-    assert done.code == 0, done.err
-    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in later]
+    data, made = tmp_path / "a.json", []
+    for words in (("validate", "planar_two_link", "--samples", "3", "--json", data), ("report", data)):
+        files = {form: tmp_path / f"{words[0]}.{form}" for form in ("html", "junit", "markdown")}
+        done = urdfkin(*words, *(f"--{form}={file}" for form, file in files.items()))
+        assert done.code == 0, done.err
+        made.append([file.read_bytes() for file in files.values()])
+    assert made[0] == made[1]
 
 
 def test_report_prints_where_no_form_is_asked_for_exits_as_the_run_did_and_hands_out_the_schema(

@@ -92,5 +92,4 @@ def test_no_seconds_of_a_report_hold_what_was_compiled(monkeypatch: pytest.Monke
     monkeypatch.setattr(campaign, "load_kernels", lambda: time.sleep(1.0))
     monkeypatch.setattr(campaign, "_kernels_pay", lambda samples: True)
     begin = time.perf_counter()
-    report = library.validate("elbow", samples=1)
-    assert report.seconds < time.perf_counter() - begin - 1.0
+    assert library.validate("elbow", samples=1).seconds < time.perf_counter() - begin - 1.0

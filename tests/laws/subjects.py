@@ -12,14 +12,9 @@ from urdfkin.robot import Robot
 EPS = np.finfo(np.float64).eps
 
 NAMES = (
-    "panda",
-    "a1",
-    "floating_root",
-    "planar_and_floating_in_the_middle",
-    "mimic_hand_40_sliding",
-    "tree_3",
+    "panda", "a1", "floating_root", "planar_and_floating_in_the_middle", "mimic_hand_40_sliding", "tree_3",
     "tree_8",
-)
+)  # fmt: skip
 
 
 def robot_of(name: str, *, mimic: bool | None = None, root_joint: str | None = None) -> Robot:
@@ -30,8 +25,7 @@ def robot_of(name: str, *, mimic: bool | None = None, root_joint: str | None = N
 
 def state(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Samples within limits and rates of about 1: (n, nq), (n, nv), (n, nv)."""
-    generator = np.random.default_rng(seed)
-    v, a = generator.standard_normal((2, n, robot.nv))
+    v, a = np.random.default_rng(seed).standard_normal((2, n, robot.nv))
     return robot.sample(n, seed), v, a
 
 

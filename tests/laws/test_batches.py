@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import urdfkin
 from tests.laws.everything import by_the_robot, differing, on_its_way_alone, prepared
 from tests.laws.subjects import NAMES, robot_of, state
 from tests.robots.odd_urdfs import Urdf
@@ -28,20 +27,20 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
-Compute = Callable[[Robot, FloatArray, FloatArray, FloatArray], FloatArray]
+Compute = Callable[..., FloatArray]
 
 QUANTITIES: dict[str, Compute] = {
-    "placement": lambda robot, q, v, a: robot.placement(q, robot.tip_frame),
-    "velocity": lambda robot, q, v, a: robot.velocity(q, v, robot.tip_frame),
-    "jacobian": lambda robot, q, v, a: robot.jacobian(q, robot.tip_frame, "local"),
-    "jacobian_rate": lambda robot, q, v, a: robot.jacobian_rate(q, v, robot.tip_frame, "world"),
-    "hessian": lambda robot, q, v, a: robot.hessian(q, robot.tip_frame, "local"),
-    "acceleration": lambda robot, q, v, a: robot.acceleration(q, v, a, robot.tip_frame, "world"),
-    "placements": lambda robot, q, v, a: robot.placement(q, robot.link_frames),
-    "velocities": lambda robot, q, v, a: robot.velocity(q, v, robot.link_frames),
-    "jacobians": lambda robot, q, v, a: robot.jacobian(q, robot.link_frames),
-    "hessians": lambda robot, q, v, a: robot.hessian(q, robot.link_frames[-3:], "world"),
-    "accelerations": lambda robot, q, v, a: robot.acceleration(q, v, a, robot.link_frames),
+    "placement": lambda r, q, v, a, **how: r.placement(q, r.tip_frame, **how),
+    "velocity": lambda r, q, v, a, **how: r.velocity(q, v, r.tip_frame, **how),
+    "jacobian": lambda r, q, v, a, **how: r.jacobian(q, r.tip_frame, "local", **how),
+    "jacobian_rate": lambda r, q, v, a, **how: r.jacobian_rate(q, v, r.tip_frame, "world", **how),
+    "hessian": lambda r, q, v, a, **how: r.hessian(q, r.tip_frame, "local", **how),
+    "acceleration": lambda r, q, v, a, **how: r.acceleration(q, v, a, r.tip_frame, "world", **how),
+    "placements": lambda r, q, v, a, **how: r.placement(q, r.link_frames, **how),
+    "velocities": lambda r, q, v, a, **how: r.velocity(q, v, r.link_frames, **how),
+    "jacobians": lambda r, q, v, a, **how: r.jacobian(q, r.link_frames, **how),
+    "hessians": lambda r, q, v, a, **how: r.hessian(q, r.link_frames[-3:], "world", **how),
+    "accelerations": lambda r, q, v, a, **how: r.acceleration(q, v, a, r.link_frames, **how),
 }
 
 
@@ -50,19 +49,13 @@ def robot(request: pytest.FixtureRequest) -> Robot:
     return robot_of(request.param)
 
 
-def agree(one: FloatArray, other: FloatArray) -> bool:
-    """Bit for bit: a configuration's result does not depend on how it was handed over."""
-    return one.shape == other.shape and one.tobytes() == other.tobytes()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_a_batch_equals_a_loop_over_its_samples(robot: Robot, quantity: str) -> None:
     compute = QUANTITIES[quantity]
     q, v, a = state(robot, 39, 1)
     batch = compute(robot, q, v, a)
-    loop = np.array([compute(robot, *row) for row in zip(q, v, a, strict=True)])
-    assert agree(batch, loop)
+    assert not differing(batch, np.array([compute(robot, *row) for row in zip(q, v, a, strict=True)]))
 
 
 @pytest.mark.parametrize("shape", [(), (1,), (0,), (5,), (16,), (2, 0, 3), (2, 3), (1, 4, 1, 5)])
@@ -70,11 +63,10 @@ def test_a_batch_equals_a_loop_over_its_samples(robot: Robot, quantity: str) -> 
 def test_any_leading_shape_comes_back(quantity: str, shape: tuple[int, ...]) -> None:
     robot = robot_of("tree_3")
     compute = QUANTITIES[quantity]
-    n = int(np.prod(shape))
-    q, v, a = state(robot, n, 2)
+    q, v, a = state(robot, int(np.prod(shape)), 2)
     flat = compute(robot, q, v, a)
     shaped = compute(robot, *(x.reshape(*shape, x.shape[1]) for x in (q, v, a)))
-    assert agree(shaped, flat.reshape(*shape, *flat.shape[1:]))
+    assert not differing(shaped, flat.reshape(*shape, *flat.shape[1:]))
     assert shaped.flags.c_contiguous
     assert shaped.dtype == np.float64
 
@@ -97,7 +89,7 @@ def test_q_v_a_and_base_broadcast_as_numpy_does(data: st.DataObject) -> None:
     q, v, a = (np.broadcast_to(x, (*whole, robot.nv)) for x in (q, v, a))
     fields = ((T, (4, 4)), (base.velocity, (6,)), (base.acceleration, (6,)))
     same = BaseMotion(*(np.broadcast_to(x, (*whole, *own)) for x, own in fields))
-    assert agree(result, robot.acceleration(q, v, a, "panda_hand", base=same))
+    assert not differing(result, robot.acceleration(q, v, a, "panda_hand", base=same))
 
 
 def _thinned(data: st.DataObject, shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -114,71 +106,39 @@ def test_memory_of_any_layout_and_type_is_read_right() -> None:
     wide[::2, ::2] = q
     read_only = q.copy()
     read_only.setflags(write=False)
-    for other in (
-        np.asfortranarray(q),
-        wide[::2, ::2],
-        q[::-1][::-1],
-        read_only,
-        q.tolist(),
-        q.astype(">f8"),
-    ):
+    layouts = [np.asfortranarray(q), wide[::2, ::2], q[::-1][::-1], read_only]
+    for other in (*layouts, q.tolist(), q.astype(">f8")):
         assert (robot.jacobian(other, "panda_hand") == straight).all()
-    single = q.astype(np.float32)
-    assert (robot.jacobian(single, "panda_hand") == robot.jacobian(single.astype(float), "panda_hand")).all()
-    whole = np.zeros(8, dtype=np.int64)
-    assert (robot.jacobian(whole, "panda_hand") == robot.jacobian(np.zeros(8), "panda_hand")).all()
+    for other in (q.astype(np.float32), np.zeros(8, dtype=np.int64)):
+        assert (
+            robot.jacobian(other, "panda_hand") == robot.jacobian(other.astype(float), "panda_hand")
+        ).all()
 
 
 def test_inputs_are_left_as_they_were_and_results_belong_to_the_caller() -> None:
     robot = load("ur5")
     q = robot.sample(4, 5)
     before = q.copy()
-    first = robot.jacobian(q, "tool0")
-    first[...] = 7.0
+    robot.jacobian(q, "tool0")[...] = 7.0
     assert (q == before).all()
     assert not (robot.jacobian(q, "tool0") == 7.0).any()
 
 
-@pytest.mark.parametrize("shape", [(), (3,), (2, 17)])
-def test_out_is_written_and_handed_back(shape: tuple[int, ...]) -> None:
-    robot = load("panda")
-    n = int(np.prod(shape))
-    q, v, a = (x.reshape(*shape, 8) for x in state(robot, n, 6))
-    frame = "panda_hand"
-    calls: list[tuple[tuple[int, ...], Callable[[FloatArray | None], FloatArray]]] = [
-        ((4, 4), lambda out: robot.placement(q, frame, out=out)),
-        ((6,), lambda out: robot.velocity(q, v, frame, out=out)),
-        ((6, 8), lambda out: robot.jacobian(q, frame, out=out)),
-        ((6, 8), lambda out: robot.jacobian_rate(q, v, frame, out=out)),
-        ((6, 8, 8), lambda out: robot.hessian(q, frame, out=out)),
-        ((6,), lambda out: robot.acceleration(q, v, a, frame, out=out)),
-    ]
-    for own, call in calls:
-        out = np.full((*shape, *own), np.nan)
-        assert call(out) is out
-        assert (out == call(None)).all()
-
-
 @pytest.mark.parametrize("shape", [(), (3,), (2, 17), (0,)])
-def test_out_is_written_for_several_frames_and_by_several_threads_too(shape: tuple[int, ...]) -> None:
-    robot = load("panda", verify="sample")
-    n = int(np.prod(shape))
-    q, v, a = (x.reshape(*shape, 8) for x in state(robot, n, 6))
-    frames = ["panda_hand", "panda_link3", "panda_rightfinger"]
-    calls: list[tuple[tuple[int, ...], Callable[..., FloatArray]]] = [
-        ((4, 4), lambda **how: robot.placement(q, frames, **how)),
-        ((6,), lambda **how: robot.velocity(q, v, frames, "local", **how)),
-        ((6, 8), lambda **how: robot.jacobian(q, frames, **how)),
-        ((6,), lambda **how: robot.acceleration(q, v, a, frames, "world", **how)),
-    ]
-    for own, call in calls:
-        out = np.full((*shape, 3, *own), np.nan)
-        assert call(out=out, threads=2) is out
-        assert (out == call()).all()
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_out_is_written_and_handed_back_by_one_thread_and_by_several(
+    quantity: str, shape: tuple[int, ...]
+) -> None:
+    robot, compute = load("panda"), QUANTITIES[quantity]
+    q, v, a = (x.reshape(*shape, 8) for x in state(robot, int(np.prod(shape)), 6))
+    expected = compute(robot, q, v, a)
+    for how in ({}, {"threads": 2, "verify": "sample"}):
+        out = np.full_like(expected, np.nan)
+        assert compute(robot, q, v, a, out=out, **how) is out
+        assert (out == expected).all()
         with pytest.raises(InputError, match="out must be a writable"):
-            call(out=np.zeros((*shape, 2, *own)))
-    rates = robot.jacobian_rate(q, v, frames[0], threads=2)
-    assert (rates == robot.jacobian_rate(q, v, frames[0])).all()
+            compute(robot, q, v, a, out=np.zeros((*expected.shape[:-1], 2)), **how)
+    assert (compute(robot, q, v, a, threads=2) == expected).all()
 
 
 def test_an_out_that_cannot_be_used_is_refused_and_left_alone() -> None:
@@ -186,15 +146,9 @@ def test_an_out_that_cannot_be_used_is_refused_and_left_alone() -> None:
     q = robot.sample(3, 7)
     read_only = np.zeros((3, 6, 8))
     read_only.setflags(write=False)
-    for out in (
-        np.zeros((3, 6, 9)),
-        np.zeros((6, 8)),
-        np.zeros((3, 6, 8), dtype=np.float32),
-        np.zeros((3, 6, 8), order="F"),
-        np.zeros((3, 6, 16))[..., ::2],
-        read_only,
-        [[0.0]],
-    ):
+    of_another_shape = np.zeros((3, 6, 9)), np.zeros((6, 8)), [[0.0]]
+    of_another_order = np.zeros((3, 6, 8), order="F"), np.zeros((3, 6, 16))[..., ::2]
+    for out in (*of_another_shape, *of_another_order, np.zeros((3, 6, 8), dtype=np.float32), read_only):
         with pytest.raises(InputError, match=r"out must be a writable C-contiguous .*\(3, 6, 8\)"):
             robot.jacobian(q, "panda_hand", out=out)  # type: ignore[arg-type]
     six = load("ur5")
@@ -266,9 +220,8 @@ def test_threads_get_what_a_single_one_gets() -> None:
     batches = [state(robot, n, n) for n in (1, 5, 16, 40, 100, 3, 64, 33) * 3]
     frames = robot.link_names
 
-    def work(k: int) -> list[FloatArray]:
-        q, v, a = batches[k]
-        frame = frames[k % len(frames)]
+    def work(robot: Robot, k: int) -> list[FloatArray]:
+        (q, v, a), frame = batches[k], frames[k % len(frames)]
         return [
             robot.placement(q, frame),
             robot.velocity(q, v, frame, "local"),
@@ -277,14 +230,14 @@ def test_threads_get_what_a_single_one_gets() -> None:
             robot.acceleration(q, v, a, frame),
         ]
 
-    serial = [work(k) for k in range(len(batches))]
-    fresh = load("a1")
-    robot = fresh  # nothing prepared: plans and Pinocchio's models are made by whichever thread comes first
+    fresh = load(
+        "a1"
+    )  # nothing prepared: plans and Pinocchio's models are made by whichever thread comes first
     with ThreadPoolExecutor(8) as pool:
-        threaded = list(pool.map(work, range(len(batches))))
-    for one, other in zip(serial, threaded, strict=True):
-        for x, y in zip(one, other, strict=True):
-            assert (x == y).all()
+        threaded = list(pool.map(partial(work, fresh), range(len(batches))))
+    for k, results in enumerate(threaded):
+        for one, other in zip(work(robot, k), results, strict=True):
+            assert (one == other).all()
     lines = {str(line.quantity): line.checked for line in fresh.certificate().lines}
     assert set(lines.values()) == {sum(len(q) for q, _, _ in batches)}
 
@@ -308,7 +261,7 @@ def test_one_configuration_for_many_rates_is_as_if_it_had_been_repeated(single: 
         ]
         # The first two know nothing of a, and do not grow with it.
         for one, other in zip(*ways, strict=True):
-            assert agree(np.broadcast_to(one, other.shape), other)
+            assert not differing(np.broadcast_to(one, other.shape), other)
 
 
 def test_one_configuration_for_many_rates_is_not_copied_for_each() -> None:
@@ -342,9 +295,9 @@ def test_an_analytical_jacobian_is_the_same_by_parts_threads_and_into_an_array(r
     one = robot.analytical_jacobian(q[:PART], frame, representation, nearest=0.0, threads=1)
     out = np.full((n, *one.shape[1:]), np.nan)
     assert robot.analytical_jacobian(q, frame, representation, nearest=0.0, out=out, threads=2) is out
-    assert agree(out[:PART], one)
+    assert not differing(out[:PART], one)
     for k in (0, PART - 1, PART, n - 1):
-        assert agree(robot.analytical_jacobian(q[k], frame, representation, nearest=0.0), out[k])
+        assert not differing(robot.analytical_jacobian(q[k], frame, representation, nearest=0.0), out[k])
     refused = np.full((n, 6 + (representation != "quaternion"), 6), np.nan)
     with pytest.raises(InputError, match="out must be a writable"):
         robot.analytical_jacobian(q, frame, representation, out=refused)
@@ -375,8 +328,8 @@ def test_a_breakdown_is_the_same_by_parts_threads_and_into_an_array(reference: R
     for k in (0, PART - 1, PART, n - 1):
         alone = ask(q[k], v[k], a[k], base=BaseMotion(velocity=base.velocity[k]))
         for parts in (serial, threaded):
-            assert agree(parts.terms[k], alone.terms)
-            assert agree(parts.base[k], alone.base)
+            assert not differing(parts.terms[k], alone.terms)
+            assert not differing(parts.base[k], alone.base)
     with pytest.raises(InputError, match="out must be a writable"):
         ask(q, v, a, out=out[:-1])
 
@@ -390,7 +343,6 @@ def test_a_breakdown_whose_part_overflows_says_in_which_samples() -> None:
 
 
 # -- a configuration has the same result, to the last bit, alone, prepared, and as any row of a batch --------
-
 
 #: Rows of a block, of the next, and of one that was filled up.
 SAMPLES = 2 * LANES + 3
@@ -437,22 +389,21 @@ def faults(robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray
 
 def all_frames_faults(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray) -> Iterator[str]:
     """Where a frame among all is not what it is by itself."""
-    for reference in urdfkin.Reference:
-        together = {
-            "placement": robot.placement(q, robot.link_frames),
-            "velocity": robot.velocity(q, v, robot.link_frames, reference),
-            "jacobian": robot.jacobian(q, robot.link_frames, reference),
-            "acceleration": robot.acceleration(q, v, a, robot.link_frames, reference),
+
+    def results(frames: str | list[str], reference: Reference) -> dict[str, FloatArray]:
+        return {
+            "placement": robot.placement(q, frames),
+            "velocity": robot.velocity(q, v, frames, reference),
+            "jacobian": robot.jacobian(q, frames, reference),
+            "acceleration": robot.acceleration(q, v, a, frames, reference),
         }
-        for f, frame in enumerate(f"link:{name}" for name in robot.link_names):
-            alone = {
-                "placement": robot.placement(q, frame),
-                "velocity": robot.velocity(q, v, frame, reference),
-                "jacobian": robot.jacobian(q, frame, reference),
-                "acceleration": robot.acceleration(q, v, a, frame, reference),
-            }
-            for what, results in together.items():
-                if differing(np.ascontiguousarray(results[:, f]), alone[what]):
+
+    frames = [f"link:{name}" for name in robot.link_names]
+    for reference in Reference:
+        together = results(frames, reference)
+        for f, frame in enumerate(frames):
+            for what, alone in results(frame, reference).items():
+                if differing(np.ascontiguousarray(together[what][:, f]), alone):
                     yield f"{what} of {frame} {reference.name}"
 
 
@@ -480,8 +431,7 @@ def test_planar_floating_and_following_joints(floating: bool) -> None:
 def test_each_tip_of_a_tree_though_it_needs_only_some_of_the_coordinates(branches: int, joints: int) -> None:
     robot = broom(branches, joints)
     for leaf in robot.tree.leaves():
-        frame = robot.tree.frame_name(leaf)
-        assert list(faults(robot, frame, *state(robot, LANES + 1, 4))) == []
+        assert list(faults(robot, robot.tree.frame_name(leaf), *state(robot, LANES + 1, 4))) == []
 
 
 @pytest.mark.slow

@@ -37,8 +37,7 @@ def stepped(robot: Robot, q: FloatArray, rate: int, step: Any) -> list[Any]:
             continue
         unit = [step if c == rate - rate_at else 0.0 for c in range(joint.kind.nv)]
         if joint.kind is JointKind.PLANAR:
-            R = about(_Z, out[at + 2])
-            x, y, _ = eq.rotate(R, (unit[0], unit[1], 0))
+            x, y, _ = eq.rotate(about(_Z, out[at + 2]), (unit[0], unit[1], 0))
             out[at : at + 3] = [out[at] + x, out[at + 1] + y, out[at + 2] + unit[2]]
         elif joint.kind is JointKind.FLOATING:
             quaternion = tuple(out[at + 3 : at + 7])

@@ -56,11 +56,8 @@ def with_a_slip(equation: str, term: str) -> ModuleType:
         def visit_Call(self, node: ast.Call) -> ast.AST:
             found = ast.unparse(node)
             self.generic_visit(node)
-            return (
-                ast.parse(f"times({FACTOR}, {ast.unparse(node)})", mode="eval").body
-                if found == term
-                else node
-            )
+            larger = f"times({FACTOR}, {ast.unparse(node)})"
+            return ast.parse(larger, mode="eval").body if found == term else node
 
     Slip().visit(function)
     module = ModuleType("slipped")

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import subprocess
 import sys
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -19,6 +17,9 @@ import yourdfpy
 from lxml import etree
 
 import urdfkin
+from tests.cli.running import python
+from tests.urdfs import joint, limit, loaded
+from tests.urdfs import robot as urdf
 from urdfkin import InputError, SourceError, UnknownNameError, UrdfError
 from urdfkin.errors import OracleError
 from urdfkin.robot import Robot
@@ -31,13 +32,6 @@ ROBOTS = ("panda", "talos", "ur5", "polar", "kinova")
 
 def file(name: str) -> str:
     return str(catalogue()[name].path)
-
-
-def loaded(source: Any, **how: Any) -> Robot:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        robot: Robot = urdfkin.load(source, **how)
-    return robot
 
 
 def yourdfpys(path: str) -> yourdfpy.URDF:
@@ -56,17 +50,10 @@ HOLDERS: dict[str, Callable[[str], Any]] = {
 
 def demand_the_same(one: Robot, other: Robot) -> None:
     assert other.coordinate_names == one.coordinate_names
-    q = one.sample(3, seed=1)
-    frames = one.link_frames
-    theirs = other.placement(q, frames)
-    np.testing.assert_allclose(theirs, one.placement(q, frames), atol=3e-14)
-    for ours, their in zip(one.tree.joints, other.tree.joints, strict=True):
-        assert (ours.name, ours.kind, ours.mimic, ours.limit) == (
-            their.name,
-            their.kind,
-            their.mimic,
-            their.limit,
-        )
+    q, frames = one.sample(3, seed=1), one.link_frames
+    np.testing.assert_allclose(other.placement(q, frames), one.placement(q, frames), atol=3e-14)
+    joints = [[(x.name, x.kind, x.mimic, x.limit) for x in robot.tree.joints] for robot in (one, other)]
+    assert joints[0] == joints[1]
     assert other.certificate().verified
 
 
@@ -129,22 +116,16 @@ def test_an_axis_of_another_length_is_told_when_it_comes_from_yourdfpy() -> None
 
 def test_a_quaternion_that_yourdfpy_dropped_is_no_secret(tmp_path: Path) -> None:
     """The object has neither the attribute nor the text: a finding says so, and so does the certificate."""
-    text = (
-        '<robot name="r" version="1.1"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/><origin {}/></joint></robot>'
-    )
-    path = tmp_path / "r.urdf"
-    said = {}
+    path, said = tmp_path / "r.urdf", {}
     for rotation in ('quat_xyzw="0 0 1 0"', 'rpy="0 0 1"', 'xyz="1 2 3"'):
-        path.write_text(text.format(rotation))
+        path.write_text(urdf(joint("j", "continuous", "a", "b", rotation), attributes='version="1.1"'))
         robot = urdfkin.load(yourdfpys(str(path)))
         robot.placement([0.0], "b")
         said[rotation] = [str(f) for f in robot.findings], robot.certificate().reading
     assert said['rpy="0 0 1"'] == ([], "")
     assert said['xyz="1 2 3"'] == said['quat_xyzw="0 0 1 0"']
-    findings, reading = said['quat_xyzw="0 0 1 0"']
-    assert len(findings) == 1
-    assert "<yourdfpy>:1:1: URDF512 note: yourdfpy ignores quat_xyzw: if the file has one" in findings[0]
+    (finding,), reading = said['quat_xyzw="0 0 1 0"']
+    assert "<yourdfpy>:1:1: URDF512 note: yourdfpy ignores quat_xyzw: if the file has one" in finding
     assert "drops quat_xyzw; the file was not read" in reading
 
 
@@ -162,8 +143,7 @@ def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
 @pytest.mark.parametrize("name", [*ROBOTS, "tiago_dual", "anymal"])
 def test_a_model_is_the_robot_it_was_built_from(name: str) -> None:
     robot = loaded(file(name), mimic=False)
-    model = pin.buildModelFromUrdf(file(name))
-    made = loaded(model)
+    made = loaded(pin.buildModelFromUrdf(file(name)))
     assert made.frame_names == robot.frame_names
     assert made.tree.links == robot.tree.links
     assert [joint.parent for joint in made.tree.joints] == [joint.parent for joint in robot.tree.joints]
@@ -212,17 +192,11 @@ def _unit(generator: np.random.Generator) -> list[float]:
 
 @pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic"])
 def test_a_joint_of_a_model_may_have_any_axis(kind: str) -> None:
-    text = (
-        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/>'
-        '<joint name="i" type="continuous"><parent link="a"/><child link="b"/></joint>'
-        f'<joint name="j" type="{kind}"><parent link="b"/><child link="c"/><origin xyz="1 2 3"/>'
-        '<axis xyz="0 0.6 -0.8"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
-    )
+    tilted = joint("j", kind, "b", "c", 'xyz="1 2 3"', "0 0.6 -0.8", limit())
+    text = urdf(joint("i", "continuous", "a", "b", axis="1 0 0"), tilted)
     robot, made = loaded(text), loaded(pin.buildModelFromXML(text))
-    assert (made.tree.joints[1].kind, made.tree.joints[1].axis.tolist()) == (
-        robot.tree.joints[1].kind,
-        [0.0, 0.6, -0.8],
-    )
+    assert made.tree.joints[1].kind == robot.tree.joints[1].kind
+    assert made.tree.joints[1].axis.tolist() == [0.0, 0.6, -0.8]
     q = [0.5, 0.3]
     np.testing.assert_allclose(made.placement(q, "c"), robot.placement(q, "c"), atol=1e-15)
     assert made.certificate().verified
@@ -235,17 +209,11 @@ def test_a_floating_base_of_the_model_stays_one() -> None:
     assert made.coordinate_names == loaded(file("a1"), root_joint="floating").coordinate_names
 
 
-@pytest.mark.parametrize(
-    ("joint", "message"),
-    [
-        (pin.JointModelSpherical, "URDF has no equivalent of this joint"),
-        (pin.JointModelTranslation, "URDF has no equivalent"),
-    ],
-)
-def test_a_joint_that_no_urdf_has_is_told_by_its_name(joint: Any, message: str) -> None:
+@pytest.mark.parametrize("made", [pin.JointModelSpherical, pin.JointModelTranslation])
+def test_a_joint_that_no_urdf_has_is_told_by_its_name(made: Any) -> None:
     model = pin.Model()
-    model.addJoint(0, joint(), pin.SE3.Identity(), "wrist")
-    with pytest.raises(InputError, match=f"joint wrist: {message}"):
+    model.addJoint(0, made(), pin.SE3.Identity(), "wrist")
+    with pytest.raises(InputError, match="joint wrist: URDF has no equivalent of this joint"):
         urdfkin.load(model)
 
 
@@ -334,18 +302,14 @@ def test_a_description_is_loaded_by_its_name_and_by_its_module(package: Path) ->
 
 
 def test_a_description_that_is_not_there_is_told_and_nothing_else_is_imported(package: Path) -> None:
-    with pytest.raises(
-        UnknownNameError, match="unknown robot description 'toys_description'; did you mean toy_desc"
+    for name, error, words in (
+        ("toys", UnknownNameError, "unknown robot description 'toys_description'; did you mean toy_desc"),
+        ("other", UnknownNameError, "unknown"),  # a module, but not listed
+        ("far", SourceError, r"cannot be downloaded: found fatal: no route to host; .*the network"),
+        ("empty", InputError, "neither URDF_PATH nor XACRO_PATH nor MJCF_PATH"),
     ):
-        urdfkin.load("toys_description")
-    with pytest.raises(UnknownNameError):
-        urdfkin.load("other_description")  # a module, but not listed
-    with pytest.raises(
-        SourceError, match=r"cannot be downloaded: found fatal: no route to host; .*the network"
-    ):
-        urdfkin.load("far_description")
-    with pytest.raises(InputError, match="neither URDF_PATH nor XACRO_PATH nor MJCF_PATH"):
-        urdfkin.load("empty_description")
+        with pytest.raises(error, match=words):
+            urdfkin.load(f"{name}_description")
     sys.modules.pop("robot_descriptions")
 
 
@@ -365,12 +329,11 @@ def test_a_module_with_a_xacro_file_brings_its_arguments(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_without_the_package_its_name_says_what_to_install() -> None:
-    code = (
+    done = python(
         "import sys\nsys.modules['robot_descriptions'] = None\nimport importlib.util as u\n"
         "find = u.find_spec\nu.find_spec = lambda name: None if name.startswith('robot_d') else find(name)\n"
         "import urdfkin\ntry: urdfkin.load('panda_description')\nexcept urdfkin.InputError as e: print(e)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("panda_description: robot_descriptions is not installed; pip install")
 
 

@@ -4,58 +4,52 @@ Each test writes down one difference and checks urdfkin's side of it, against Pi
 """
 
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
 
 import urdfkin
 from tests.reading import present
-from tests.urdf.lint.cases.arm import LIMIT, arm, fixed
+from tests.urdf.lint.cases.arm import LIMIT, arm, base_link, fixed, shape
+from tests.urdfs import joint, mimic
 from urdfkin.robot import Robot
 from urdfkin.verify.verifier import NotVerifiedWarning
 
 TIP = "link:tool"
 
 
-def load(text: str, **options: object) -> Robot:
-    """A robot whose every result is verified: one that is not raises."""
+def verified(text: str, **options: Any) -> Robot:
+    """A robot whose every quantity was asked for and verified: one that is not raises."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
         warnings.simplefilter("error", NotVerifiedWarning)
-        return urdfkin.load(text, **options)  # type: ignore[arg-type]
-
-
-def everything(robot: Robot) -> None:
-    """Ask for each quantity; each is verified on the way."""
-    generator = np.random.default_rng(0)
+        robot = urdfkin.load(text, **options)
     q = robot.sample(3, seed=1)
-    v, a = generator.normal(size=(2, 3, robot.nv))
+    v, a = np.random.default_rng(0).normal(size=(2, 3, robot.nv))
     robot.placement(q, TIP)
     robot.velocity(q, v, TIP)
     robot.jacobian(q, TIP)
     robot.acceleration(q, v, a, TIP)
     assert robot.certificate().verified
+    return robot
 
 
 def test_an_axis_that_is_no_unit_vector_is_normalised() -> None:
     """Yourdfpy moves a prismatic joint with axis 0 0 2 twice as far."""
-    robot = load(arm(attributes='type="prismatic"', axis='<axis xyz="0 0 2"/>'))
-    everything(robot)
+    robot = verified(arm(attributes='type="prismatic"', axis='<axis xyz="0 0 2"/>'))
     T = robot.placement([[0.0, 0.0], [1.0, 0.0]], TIP)
     assert np.linalg.norm(T[1, :3, 3] - T[0, :3, 3]) == pytest.approx(1.0, abs=1e-15)
 
 
 @pytest.mark.parametrize("axis", ["1e-9 0 0", "0 1e100 0", "3 4 0", "0.577 0.577 0.577"])
 def test_every_axis_with_a_direction_is_a_unit_vector_in_the_tree(axis: str) -> None:
-    robot = load(arm(axis=f'<axis xyz="{axis}"/>'))
-    everything(robot)
+    robot = verified(arm(axis=f'<axis xyz="{axis}"/>'))
     assert np.linalg.norm(robot.tree.joints[0].axis) == pytest.approx(1.0, abs=1e-15)
 
 
 def test_an_axis_that_is_not_written_is_x() -> None:
-    robot = load(arm(axis=""))
-    everything(robot)
-    assert robot.tree.joints[0].axis.tolist() == [1.0, 0.0, 0.0]
+    assert verified(arm(axis="")).tree.joints[0].axis.tolist() == [1.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("element", ["<axis/>", '<axis note="z"/>', "<axis><!-- 0 0 1 --></axis>"])
@@ -66,78 +60,62 @@ def test_an_axis_element_without_xyz_is_refused_because_two_readers_see_two_robo
 
 
 def test_a_planar_joint_whose_axis_element_is_empty_moves_in_the_xy_plane_for_both() -> None:
-    everything(load(arm(axis="<axis/>", attributes='type="planar"')))
+    verified(arm(axis="<axis/>", attributes='type="planar"'))
 
 
 def test_joints_stand_depth_first_and_siblings_by_name_not_as_in_the_file() -> None:
     """Yourdfpy keeps the order of the file."""
     more = '<link name="x"/><joint name="a0" type="continuous"><parent link="base"/><child link="x"/></joint>'
-    robot = load(arm(more=more))
-    everything(robot)
-    assert robot.joint_names == ("a0", "j1", "j2")
+    assert verified(arm(more=more)).joint_names == ("a0", "j1", "j2")
 
 
 def test_a_follower_takes_no_coordinate_and_is_coupled() -> None:
     """Yourdfpy keeps a coordinate for it in some of its views; Pinocchio throws for some mimic robots."""
-    robot = load(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>'))
-    everything(robot)
+    text = arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>')
+    robot, free = verified(text), verified(text, mimic=False)
     assert robot.nq == 1
-    free = load(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>'), mimic=False)
-    np.testing.assert_allclose(
-        robot.placement([0.3], TIP), free.placement([0.3, -2 * 0.3 + 0.1], TIP), atol=1e-15
-    )
+    T = free.placement([0.3, -2 * 0.3 + 0.1], TIP)
+    np.testing.assert_allclose(robot.placement([0.3], TIP), T, atol=1e-15)
 
 
 def test_a_continuous_follower_is_coupled_although_pinocchio_would_let_it_turn() -> None:
-    robot = load(
-        arm(second='type="continuous"', follow='<mimic joint="j1"/>').replace(LIMIT + "<mimic", "<mimic")
-    )
-    everything(robot)
-    assert robot.nq == 1
+    text = arm(second='type="continuous"', follow='<mimic joint="j1"/>')
+    assert verified(text.replace(LIMIT + "<mimic", "<mimic")).nq == 1
 
 
 def test_a_chain_of_followers_is_resolved() -> None:
-    third = (
-        '<link name="x"/><joint name="j3" type="revolute"><parent link="tool"/><child link="x"/>'
-        f'{LIMIT}<mimic joint="j2" multiplier="3" offset="0.5"/></joint>'
-    )
-    robot = load(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>', more=third))
-    everything(robot)
-    mimic = present(robot.tree.joints[2].mimic)
-    assert (mimic.leader, mimic.multiplier) == ("j1", -6.0)
-    assert mimic.offset == pytest.approx(3 * 0.1 + 0.5)
+    third = joint("j3", "revolute", "tool", "x", axis="", more=LIMIT + mimic("j2", 3, 0.5))
+    more = f'<link name="x"/>{third}'
+    robot = verified(arm(follow='<mimic joint="j1" multiplier="-2" offset="0.1"/>', more=more))
+    rule = present(robot.tree.joints[2].mimic)
+    assert (rule.leader, rule.multiplier) == ("j1", -6.0)
+    assert rule.offset == pytest.approx(3 * 0.1 + 0.5)
 
 
 def test_a_fixed_followers_mimic_is_ignored() -> None:
-    everything(load(arm(second='type="fixed"', follow='<mimic joint="j1"/>')))
+    verified(arm(second='type="fixed"', follow='<mimic joint="j1"/>'))
 
 
 @pytest.mark.parametrize("axis", ['<axis xyz="1 0 0"/>', '<axis xyz="0 0 1"/>', ""])
 def test_a_planar_joint_moves_in_its_frames_xy_plane(axis: str) -> None:
     """Yourdfpy does not move planar joints; the specification's normal is ignored as Pinocchio ignores it."""
-    robot = load(arm(attributes='type="planar"', axis=axis, limit="", origin=""))
-    everything(robot)
-    T = robot.placement([0.3, -0.2, 0.0, 0.0], "link:l1")
-    assert T[:3, 3].tolist() == [0.3, -0.2, 0.0]
+    robot = verified(arm(attributes='type="planar"', axis=axis, limit="", origin=""))
+    assert robot.placement([0.3, -0.2, 0.0, 0.0], "link:l1")[:3, 3].tolist() == [0.3, -0.2, 0.0]
 
 
 def test_a_floating_joint_has_seven_coordinates_and_six_rates() -> None:
     """Yourdfpy does not move floating joints."""
-    robot = load(arm(attributes='type="floating"', axis="", limit=""))
-    everything(robot)
+    robot = verified(arm(attributes='type="floating"', axis="", limit=""))
     assert (robot.nq, robot.nv) == (8, 7)
 
 
 def test_limits_of_a_continuous_joint_are_ignored() -> None:
-    robot = load(arm(attributes='type="continuous"'))
-    everything(robot)
-    limit = present(robot.tree.joints[0].limit)
+    limit = present(verified(arm(attributes='type="continuous"')).tree.joints[0].limit)
     assert (limit.lower, limit.upper) == (-np.inf, np.inf)
 
 
 def test_a_limit_that_is_not_written_is_zero() -> None:
-    robot = load(arm(limit='<limit upper="1" effort="1" velocity="1"/>'))
-    everything(robot)
+    robot = verified(arm(limit='<limit upper="1" effort="1" velocity="1"/>'))
     limit = present(robot.tree.joints[0].limit)
     assert (limit.lower, limit.upper) == (0.0, 1.0)
 
@@ -145,44 +123,29 @@ def test_a_limit_that_is_not_written_is_zero() -> None:
 def test_a_quaternion_is_obeyed_from_version_1_1_on() -> None:
     """Yourdfpy ignores it."""
     turned = '<origin xyz="0 0 1" quat_xyzw="0 0 1 1"/>'
-    old = load(arm(origin=turned))
-    new = load(arm(origin=turned, robot='name="r" version="1.1"'))
-    everything(old)
-    everything(new)
+    old, new = (verified(arm(origin=turned, robot=f'name="r" {x}')) for x in ("", 'version="1.1"'))
     np.testing.assert_array_equal(old.placement(old.neutral(), "link:l1")[:3, :3], np.eye(3))
     R = new.placement(new.neutral(), "link:l1")[:3, :3]
     np.testing.assert_allclose(R, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        arm(base='<link name="base"><visual><geometry><box size="a b"/></geometry></visual></link>'),
-        arm(base='<link name="base"><inertial><inertia ixx="1"/></inertial></link>'),
-        arm(base='<link name="base"><inertial><mass value="x"/></inertial></link>'),
-        arm(base='<link name="base"><visual/></link>'),
-        arm(robot='name="r" xmlns="http://example.org"'),
-        arm(more="<a>" * 400 + "</a>" * 400),
-        arm(more='<material name="m"><color rgba="1 1"/></material>'),
-        arm(head='<?xml version="1.0"?><!DOCTYPE robot>'),
-        "\ufeff" + arm(),
-        arm(head="<!-- first -->").replace("<parent", "<!-- x --><parent"),
-    ],
-    ids=[
-        "shape",
-        "inertia",
-        "mass",
-        "visual",
-        "namespace",
-        "nesting",
-        "colour",
-        "doctype",
-        "mark",
-        "comments",
-    ],
-)
-def test_what_yourdfpy_stumbles_over_is_read_as_pinocchio_reads_it(text: str) -> None:
-    everything(load(text))
+STUMBLES = {
+    "shape": base_link(shape('<box size="a b"/>')),
+    "inertia": base_link('<inertial><inertia ixx="1"/></inertial>'),
+    "mass": base_link('<inertial><mass value="x"/></inertial>'),
+    "visual": base_link("<visual/>"),
+    "namespace": arm(robot='name="r" xmlns="http://example.org"'),
+    "nesting": arm(more="<a>" * 400 + "</a>" * 400),
+    "colour": arm(more='<material name="m"><color rgba="1 1"/></material>'),
+    "doctype": arm(head='<?xml version="1.0"?><!DOCTYPE robot>'),
+    "mark": "\ufeff" + arm(),
+    "comments": arm(head="<!-- first -->").replace("<parent", "<!-- x --><parent"),
+}
+
+
+@pytest.mark.parametrize("what", STUMBLES)
+def test_what_yourdfpy_stumbles_over_is_read_as_pinocchio_reads_it(what: str) -> None:
+    verified(STUMBLES[what])
 
 
 @pytest.mark.parametrize(
@@ -205,8 +168,8 @@ def test_what_pinocchio_cannot_check_is_computed_and_never_called_verified(text:
 
 def test_a_robot_of_one_rate_is_verified_in_every_quantity() -> None:
     """Pinocchio hands out a single column as a plain vector."""
-    everything(load(arm(second='type="fixed"')))
+    verified(arm(second='type="fixed"'))
 
 
 def test_a_robot_as_small_as_a_denormal_number_is_verified() -> None:
-    everything(load(arm(origin='<origin xyz="0 1e-310 3e-167"/>')))
+    verified(arm(origin='<origin xyz="0 1e-310 3e-167"/>'))

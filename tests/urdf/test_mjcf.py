@@ -16,7 +16,9 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import good
 from tests.cli.running import urdfkin as command
+from tests.reading import present
 from tests.urdf.lint.cases.arm import arm
 from tests.urdfs import loaded
 from urdfkin.errors import InputError, OracleError
@@ -69,26 +71,14 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mjcf_check, "_ask", ask)
 
 
-def one_joint(joint: str, body: str = "") -> str:
-    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+
+
+def one_joint(joint: str) -> str:
     return (
-        f'<mujoco><compiler angle="radian"/><worldbody><body name="b" pos="1 0 0" {body}>{inertial}{joint}'
+        f'<mujoco><compiler angle="radian"/><worldbody><body name="b" pos="1 0 0">{MASS}{joint}'
         '<site name="s" pos="0 0 0.5"/></body></worldbody></mujoco>'
     )
-
-
-def test_a_hinge_turns_about_its_anchor() -> None:
-    robot = loaded(one_joint('<joint name="j" axis="0 0 1" pos="0 2 0"/>'))
-    T = robot.placement([math.pi], "b")
-    assert T[:3, 3] == pytest.approx([1.0, 4.0, 0.0])  # half a turn about (1, 2, 0)
-    assert T[:3, :3] == pytest.approx(np.diag([-1.0, -1.0, 1.0]))
-
-
-def test_a_reference_value_is_where_the_file_draws_the_body() -> None:
-    turning = loaded(one_joint('<joint name="j" axis="0 0 1" pos="0 2 0" ref="0.5"/>'))
-    assert turning.placement([0.5], "b")[:3, 3] == pytest.approx([1.0, 0.0, 0.0])
-    sliding = loaded(one_joint('<joint name="j" type="slide" axis="0 0 1" ref="0.5" range="0 1"/>'))
-    assert sliding.placement([0.75], "b")[:3, 3] == pytest.approx([1.0, 0.0, 0.25])
 
 
 def test_joints_of_one_body_move_one_after_the_other() -> None:
@@ -126,30 +116,22 @@ def random_mjcf(rng: np.random.Generator) -> tuple[str, list[str]]:
     def vector(size: float = 1.0, n: int = 3) -> str:
         return " ".join(repr(float(x)) for x in size * rng.normal(size=n))
 
-    names, open_bodies, text = [], 0, []
+    names, open_bodies, text = [], 0, ""
     for i in range(int(rng.integers(2, 7))):
         while open_bodies and rng.random() < 0.3:
-            text.append("</body>")
+            text += "</body>"
             open_bodies -= 1
         turned = f'quat="{vector(n=4)}"' if rng.random() < 0.5 else f'euler="{vector()}"'
-        text.append(f'<body name="b{i}" pos="{vector()}" {turned}>')
-        text.append('<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>')
+        text += f'<body name="b{i}" pos="{vector()}" {turned}>{MASS}'
         open_bodies += 1
         for j in range(int(rng.integers(0, 4))):
             kind = rng.choice(["hinge", "slide"])
             anchor = f'pos="{vector()}"' if rng.random() < 0.7 else ""
-            name = f"j{i}_{j}"
-            names.append(name)
-            text.append(
-                f'<joint name="{name}" type="{kind}" axis="{vector()}" {anchor} ref="{rng.normal()!r}"'
-                ' limited="true" range="-3 3"/>'
-            )
-    sequence = rng.choice(["xyz", "ZYX", "zxz"])
-    return (
-        f'<mujoco><compiler angle="radian" eulerseq="{sequence}"/><worldbody>{"".join(text)}'
-        f"{'</body>' * open_bodies}</worldbody></mujoco>",
-        names,
-    )
+            names.append(f"j{i}_{j}")
+            text += f'<joint name="{names[-1]}" type="{kind}" axis="{vector()}" {anchor}'
+            text += f' ref="{rng.normal()!r}" limited="true" range="-3 3"/>'
+    compiler = f'<compiler angle="radian" eulerseq="{rng.choice(["xyz", "ZYX", "zxz"])}"/>'
+    return f"<mujoco>{compiler}<worldbody>{text}{'</body>' * open_bodies}</worldbody></mujoco>", names
 
 
 @pytest.mark.slow
@@ -203,8 +185,7 @@ def test_an_equality_between_two_joints_is_obeyed() -> None:
     assert (follower.mimic.leader, follower.mimic.multiplier) == ("pitch", 2.0)
     # y - 0 = 0.1 + 2 (x - 30 degrees)
     assert follower.mimic.offset == pytest.approx(0.1 - math.pi / 3)
-    free = loaded(TWO, mimic=False)
-    assert free.nq == robot.nq + 1
+    assert loaded(TWO, mimic=False).nq == robot.nq + 1
 
 
 @pytest.mark.parametrize(
@@ -246,27 +227,21 @@ def test_comments_before_the_root_take_no_longer_than_they_are_long(root: str) -
 
 
 def test_what_is_mjcf_is_told_by_its_root(tmp_path: Path) -> None:
-    texts = {
-        "a.xml": TWO,
-        "b.xml": arm(),
-        "c.mjcf": f"<?xml version='1.0'?><!-- robot -->{TWO}",
-        "d.urdf": TWO,
-    }
+    commented = f"<?xml version='1.0'?><!-- robot -->{TWO}"
+    texts = {"a.xml": TWO, "b.xml": arm(), "c.mjcf": commented, "d.urdf": TWO}
     for name, text in texts.items():
         (tmp_path / name).write_text(text, "utf-8")
     assert [is_mjcf(tmp_path / name) for name in texts] == [True, False, True, False]
     assert loaded(tmp_path / "b.xml").nq == 2
     assert not is_mjcf(tmp_path / "nothing.xml")
-    with pytest.raises(
-        urdfkin.UrdfError, match="this is an MJCF file; `load` and all other commands read it"
-    ):
+    words = "this is an MJCF file; `load` and all other commands read it"
+    with pytest.raises(urdfkin.UrdfError, match=words):
         urdfkin.load(tmp_path / "d.urdf")
 
 
 def test_it_may_come_as_bytes_or_from_a_stream(monkeypatch: pytest.MonkeyPatch) -> None:
     text = one_joint('<joint name="j" axis="0 0 1" pos="0 2 0"/>')
-    standard_input = io.TextIOWrapper(io.BytesIO(text.encode()))
-    monkeypatch.setattr("sys.stdin", standard_input)
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
     data = text.encode()
     sources: list[Source] = [text, data, b"\xef\xbb\xbf" + data, io.StringIO(text), io.BytesIO(data), "-"]
     for source in sources:
@@ -285,25 +260,17 @@ def test_each_of_its_findings_has_a_page_whose_examples_are_true(code: str) -> N
         for text in (said.example, said.cure)
     ] == [{code}, set()]
     assert next(f for f in loaded(said.example).findings if f.code == code).severity is rule.severity
-    shown = command("explain", rule.slug)
-    assert shown.text.startswith(f"{code} {rule.slug} ({rule.severity.value})")
+    assert command("explain", rule.slug).text.startswith(f"{code} {rule.slug} ({rule.severity.value})")
 
 
 @pytest.mark.slow
 def test_a_mjcf_is_a_robot_to_every_command(tmp_path: Path) -> None:
-    path = tmp_path / "arm.xml"
-    path.write_text(
-        one_joint('<joint name="a" range="-1 2"/><joint name="b" axis="0 1 0" pos="1 1 1"/>'), "utf-8"
-    )
-    report = tmp_path / "report.json"
-    for words in (
-        ["info", str(path)],
-        ["jacobian", str(path), "--q", "random"],
-        ["dh", str(path)],
-        ["validate", str(path), "--samples", "2", "--oracle", "mujoco", "--json", str(report)],
-    ):
-        done = command(*words)
-        assert done.code == 0, (words, done)
+    path, report = tmp_path / "arm.xml", tmp_path / "report.json"
+    path.write_text(one_joint('<joint name="a" range="-1 2"/><joint name="b" axis="0 1 0" pos="1 1 1"/>'))
+    good("info", str(path))
+    good("jacobian", str(path), "--q", "random")
+    good("dh", str(path))
+    good("validate", str(path), "--samples", "2", "--oracle", "mujoco", "--json", str(report))
     robot = json.loads(report.read_text("utf-8"))["robots"][0]
     assert robot["verdict"] == "verified"
     assert robot["model"]["links"][0] == "world"
@@ -335,6 +302,9 @@ def free_body(
     )
 
 
+FUSED = _BOX + _ARM.format("")
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -344,39 +314,36 @@ def free_body(
         free_body(joint='align="true"', inside='<inertial pos="1 2 3" mass="1" diaginertia="1 2 3"/>'),
         free_body('alignfree="true" fusestatic="true"'),
         free_body('alignfree="true"', inside=_BOX + _ARM.format('<joint name="j"/>')),
-        free_body('alignfree="true"', inside=_BOX + _ARM.format("")),
-        free_body('fusestatic="true"', inside=_BOX + _ARM.format("")),
+        free_body('alignfree="true"', inside=FUSED),
+        free_body('fusestatic="true"', inside=FUSED),
     ],
 )  # fmt: skip
 def test_a_free_body_that_mujoco_aligns_moves_as_in_mujoco(text: str) -> None:
     """Places and velocities, of MuJoCo's own model of the file as it is."""
     robot = loaded(text)
     model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
+    data, site, theirs = mujoco.MjData(model), mujoco.mjtObj.mjOBJ_SITE, np.zeros(6)
     data.qpos[:7] = [1.0, 2.0, 3.0, 0.5, 0.5, -0.5, 0.5]
     data.qvel[3:6] = [0.1, -0.2, 1.0]
     mujoco.mj_forward(model, data)
-    q = np.zeros(robot.nq)
-    q[:7] = [1.0, 2.0, 3.0, 0.5, -0.5, 0.5, 0.5]
-    v = np.zeros(robot.nv)
-    v[3:6] = [0.1, -0.2, 1.0]
-    assert robot.placement(q, "camera")[:3, 3] == pytest.approx(data.site("camera").xpos, abs=1e-14)
-    assert robot.placement(q, "camera")[:3, :3].ravel() == pytest.approx(data.site("camera").xmat, abs=1e-14)
-    theirs = np.zeros(6)
-    site = mujoco.mjtObj.mjOBJ_SITE
     mujoco.mj_objectVelocity(model, data, site, 0, theirs, 0)
+    q, v = np.zeros(robot.nq), np.zeros(robot.nv)
+    q[:7] = [1.0, 2.0, 3.0, 0.5, -0.5, 0.5, 0.5]
+    v[3:6] = [0.1, -0.2, 1.0]
+    T = robot.placement(q, "camera")
+    assert T[:3, 3] == pytest.approx(data.site("camera").xpos, abs=1e-14)
+    assert T[:3, :3].ravel() == pytest.approx(data.site("camera").xmat, abs=1e-14)
     assert robot.velocity(q, v, "camera") == pytest.approx(np.roll(theirs, 3), abs=1e-13)
     assert "does not compile" not in robot.certificate().reading
-    unchecked = loaded(text, verify=False)
-    np.testing.assert_array_equal(unchecked.placement(q, "camera"), robot.placement(q, "camera"))
+    np.testing.assert_array_equal(loaded(text, verify=False).placement(q, "camera"), T)
 
 
 def test_a_body_that_cannot_be_aligned_is_listed_and_the_certificate_says_what_was_not_checked() -> None:
     mesh = '<asset><mesh name="m" file="nowhere.stl"/></asset>'
-    with pytest.warns(
-        urdfkin.UrdfWarning, match=r"MJCF101.*'drone': MuJoCo aligns the frame of this free body"
-    ):
-        robot = urdfkin.load(free_body('alignfree="true"', inside='<geom type="mesh" mesh="m"/>', more=mesh))
+    text = free_body('alignfree="true"', inside='<geom type="mesh" mesh="m"/>', more=mesh)
+    words = r"MJCF101.*'drone': MuJoCo aligns the frame of this free body"
+    with pytest.warns(urdfkin.UrdfWarning, match=words):
+        robot = urdfkin.load(text)
     robot.placement(robot.neutral(), "camera")
     said = robot.certificate().reading
     assert "MuJoCo compiles the file only without shapes and inertias: Error: Error opening" in said
@@ -384,12 +351,11 @@ def test_a_body_that_cannot_be_aligned_is_listed_and_the_certificate_says_what_w
 
 def test_a_free_body_that_others_are_fused_into_is_refused_where_it_is_aligned() -> None:
     with pytest.raises(InputError, match=r'body drone: .*write fusestatic="false" or align="false"'):
-        loaded(free_body('alignfree="true" fusestatic="true"', inside=_BOX + _ARM.format("")))
+        loaded(free_body('alignfree="true" fusestatic="true"', inside=FUSED))
 
 
 def test_a_static_body_that_the_file_has_fused_stays_a_link() -> None:
-    text = free_body('fusestatic="true"', inside=_BOX + _ARM.format(""))
-    robot = loaded(text)
+    robot = loaded(free_body('fusestatic="true"', inside=FUSED))
     assert robot.placement(robot.neutral(), "arm")[:3, 3] == pytest.approx([0.0, 0.0, 2.0])
     assert robot.certificate().verified
 
@@ -400,14 +366,11 @@ def test_a_static_body_that_the_file_has_fused_stays_a_link() -> None:
 def coupled(*equalities: str, refs: tuple[float, ...] = (0.3, -0.4, 0.5)) -> str:
     """Three hinges, one after the other, with reference values."""
     open_ = "".join(
-        f'<body name="{name}" pos="0.1 0.2 0.3"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-        f'<joint name="{name}" axis="0 {i} 1" ref="{ref}"/>'
+        f'<body name="{name}" pos="0.1 0.2 0.3">{MASS}<joint name="{name}" axis="0 {i} 1" ref="{ref}"/>'
         for i, (name, ref) in enumerate(zip("abc", refs, strict=True))
     )
-    return (
-        f'<mujoco><compiler angle="radian"/><worldbody>{open_}{"</body>" * 3}</worldbody>'
-        f"<equality>{''.join(equalities)}</equality></mujoco>"
-    )
+    world = f'<compiler angle="radian"/><worldbody>{open_}{"</body>" * 3}</worldbody>'
+    return f"<mujoco>{world}<equality>{''.join(equalities)}</equality></mujoco>"
 
 
 _CHAIN = (
@@ -419,13 +382,10 @@ _CHAIN = (
 def test_an_equality_after_an_equality_is_obeyed_as_mujoco_has_it() -> None:
     robot = loaded(coupled(*_CHAIN))
     assert robot.coordinate_names == ("a",)
-    rules = {joint.name: joint.mimic for joint in robot.tree.joints if joint.mimic is not None}
+    b, c = (present(joint.mimic) for joint in robot.tree.joints if joint.name in "bc")
     # b + 0.4 = 0.1 + 2 (a - 0.3), c - 0.5 = 0.2 - 3 (b + 0.4)
-    assert (rules["b"].leader, rules["b"].multiplier, rules["c"].leader, rules["c"].multiplier) == (
-        "a", 2.0, "a", -6.0,
-    )  # fmt: skip
-    assert rules["b"].offset == pytest.approx(-0.9)
-    assert rules["c"].offset == pytest.approx(0.7 - 3.0 * -0.5)
+    assert (b.leader, b.multiplier, c.leader, c.multiplier) == ("a", 2.0, "a", -6.0)
+    assert (b.offset, c.offset) == pytest.approx((-0.9, 0.7 - 3.0 * -0.5))
     robot.placement(robot.sample(3), "c")
     certificate = robot.certificate()
     assert certificate.verified
@@ -499,11 +459,10 @@ def test_a_rule_that_mujoco_does_not_hold_and_one_that_was_dropped_are_found(
 @pytest.mark.parametrize("ref", [0.0, 1e3, -1e6])
 @pytest.mark.parametrize("kind", ["hinge", "slide"])
 def test_a_large_reference_value_is_no_disagreement(kind: str, ref: float) -> None:
-    robot = loaded(one_joint(f'<joint name="j" type="{kind}" axis="1 2 3" pos="0 2 0" ref="{ref!r}"/>'))
-    q = robot.sample(1)[0]
-    model = one_joint(f'<joint name="j" type="{kind}" axis="1 2 3" pos="0 2 0" ref="{ref!r}"/>')
-    atol = 1e-13 * max(1.0, abs(ref) / 100)
-    np.testing.assert_allclose(robot.placement(q, "link:b"), of_mujoco(model, q, "b"), atol=atol)
+    text = one_joint(f'<joint name="j" type="{kind}" axis="1 2 3" pos="0 2 0" ref="{ref!r}"/>')
+    robot = loaded(text)
+    q, atol = robot.sample(1)[0], 1e-13 * max(1.0, abs(ref) / 100)
+    np.testing.assert_allclose(robot.placement(q, "link:b"), of_mujoco(text, q, "b"), atol=atol)
 
 
 @pytest.mark.parametrize(
@@ -571,9 +530,8 @@ def test_memory_that_a_file_sets_apart_for_its_dynamics_is_not_taken() -> None:
 
 def test_a_process_that_dies_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mjcf_check, "ask_python", lambda *arguments: (b'{"urdf": "half', -11))
-    with pytest.raises(
-        InputError, match="<text>: MuJoCo cannot compile this MJCF: found MuJoCo's process ended"
-    ):
+    words = "<text>: MuJoCo cannot compile this MJCF: found MuJoCo's process ended"
+    with pytest.raises(InputError, match=words):
         loaded(free_body())
 
 
@@ -646,14 +604,13 @@ def test_a_finding_has_the_element_and_the_line_of_its_part_of_the_file(tmp_path
         assert line[column : column + one["width"]] == start, key
     assert [(one["element"], one["width"]) for one in found.values()] == [(None, 0)]  # inertias, sensors
     assert "14 |     <weld name=" in command("check", str(path)).text
-    assert (
-        "line=14,col=5,endColumn=22,title=MJCF101" in command("check", "--format", "github", str(path)).text
-    )
-    run = json.loads(command("check", "--format", "sarif", str(path)).text)["runs"][0]
+    annotations = command("check", "--format", "github", str(path)).text
+    assert "line=14,col=5,endColumn=22,title=MJCF101" in annotations
+    results = command("check", "--format", "sarif", str(path)).data["runs"][0]["results"]
     places = [
-        one["logicalLocations"][0] for [one] in (r["locations"] for r in run["results"]) if len(one) > 1
+        one for result in results for [one, *more] in [result["locations"]] if "logicalLocations" in one
     ]
-    assert {"name": "glue", "kind": "equality"} in places
+    assert {"name": "glue", "kind": "equality"} in [one["logicalLocations"][0] for one in places]
 
 
 def test_a_part_of_an_included_file_has_no_line(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """A tree that is written as URDF and read back is the same tree, and Pinocchio agrees on its kinematics."""
 
 import math
-import warnings
 
 import numpy as np
 import pytest
@@ -9,14 +8,13 @@ from hypothesis import given, settings
 
 from tests.reading import tree_of
 from tests.strategies import rotation, rotations, trees
+from tests.urdfs import loaded
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
-from urdfkin.robot.loading import load
-from urdfkin.urdf.lint import Severity, UrdfWarning, check_text
+from urdfkin.urdf.lint import Severity, check_text
 from urdfkin.urdf.reader import rpy_of_quaternion
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verify.verifier import NotVerifiedWarning
 
 EPS = float(np.finfo(float).eps)
 
@@ -47,16 +45,13 @@ def test_writing_twice_changes_nothing_but_the_last_digits_of_angles(tree: Kinem
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("error::urdfkin.NotVerifiedWarning")
 @settings(max_examples=30)
 @given(trees(max_joints=6))
 def test_pinocchio_agrees_on_every_written_tree(tree: KinematicTree) -> None:
-    text = to_urdf(tree)
-    if any(finding.oracle for finding in check_text(text.encode())):
+    if any(finding.oracle for finding in check_text(to_urdf(tree).encode())):
         return
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UrdfWarning)
-        warnings.simplefilter("error", NotVerifiedWarning)
-        robot = load(text)
+    robot = loaded(tree)
     q = robot.sample(2, seed=0) if robot.nq else np.zeros((2, 0))
     v = np.full((2, robot.nv), 0.7)
     frame = f"link:{tree.links[-1]}"
@@ -99,13 +94,13 @@ def test_a_name_that_xml_cannot_hold_is_not_written() -> None:
 
 
 def test_an_infinite_effort_makes_the_file_version_1_2() -> None:
-    joint = Joint(
-        "j", JointKind.REVOLUTE, 0, np.eye(4), np.array([0.0, 0.0, 1.0]), limit=Limit(-1, 1, 2.0, math.inf)
-    )
-    text = to_urdf(build_tree("r", "a", [(joint, "a", "b")]))
+    limit, z = Limit(-1, 1, 2.0, math.inf), np.array([0.0, 0.0, 1.0])
+    joint = Joint("j", JointKind.REVOLUTE, 0, np.eye(4), z, limit=limit)
+    tree = build_tree("r", "a", [(joint, "a", "b")])
+    text = to_urdf(tree)
     assert 'version="1.2"' in text
     assert [f.oracle for f in check_text(text.encode())] == [None]
-    assert_same(tree_of(text.encode()), build_tree("r", "a", [(joint, "a", "b")]))
+    assert_same(tree_of(text.encode()), tree)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-140, 1e140, -3.0])

@@ -34,12 +34,9 @@ def test_reading_ends_one_byte_after_what_is_allowed(
 ) -> None:
     data = large.read_bytes()
     source: Any = {
-        "path": large,
-        "word": os.fspath(large),
-        "bytes stream": io.BytesIO(data),
-        "text stream": io.StringIO(data.decode()),
-        "standard input": "-",
-    }[how]
+        "path": large, "word": os.fspath(large), "bytes stream": io.BytesIO(data),
+        "text stream": io.StringIO(data.decode()), "standard input": "-",
+    }[how]  # fmt: skip
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
     assert len(read_source(source, MOST_HERE).data) == MOST_HERE + 1
 
@@ -78,7 +75,6 @@ def test_no_name_of_the_catalogue_has_a_point_or_a_separator() -> None:
 
 
 # -- a text is read once to be checked and computed; Pinocchio's side reads it again when it is asked --------
-
 
 FOLLOWS = arm(follow='<mimic joint="j1" multiplier="-0.5"/>')
 

@@ -140,21 +140,18 @@ def test_validate_expands_once_and_passes(arm: Path) -> None:
 
 
 def test_packages_are_found_in_the_documented_order(tmp_path: Path) -> None:
-    ros, deep, ament = tmp_path / "ros" / "pkg", tmp_path / "src" / "repository" / "pkg", tmp_path / "opt"
     above = tmp_path / "up" / "pkg"
-    for folder in (ros, deep, ament / "share" / "pkg", above / "urdf"):
+    places = [tmp_path / place for place in ("ros/pkg", "src/repository/pkg", "opt/share/pkg")]
+    for folder in (*places, above / "urdf"):
         folder.mkdir(parents=True)
     beside = above / "urdf" / "a.urdf"
     environ = {
         "ROS_PACKAGE_PATH": os.pathsep.join((str(tmp_path / "ros"), str(tmp_path / "src"))),
-        "AMENT_PREFIX_PATH": str(ament),
+        "AMENT_PREFIX_PATH": str(tmp_path / "opt"),
     }
-    assert find_package("pkg", beside, environ) == ros
-    ros.rmdir()
-    assert find_package("pkg", beside, environ) == deep
-    deep.rmdir()
-    assert find_package("pkg", beside, environ) == ament / "share" / "pkg"
-    (ament / "share" / "pkg").rmdir()
+    for place in places:
+        assert find_package("pkg", beside, environ) == place
+        place.rmdir()
     assert find_package("pkg", beside, environ) == above
     assert find_package("other", beside, environ) is None
 

@@ -18,14 +18,8 @@ _VERDICTS = {0: "reads", 1: "refuses"}
 
 def ask(documents: Sequence[str]) -> list[dict[str, str]]:
     """For each document: `{"pinocchio": ..., "yourdfpy": ...}`, each `reads`, `refuses` or `dies`."""
-    done = subprocess.run(
-        [sys.executable, __file__],
-        input=json.dumps(list(documents)).encode(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        check=True,
-        timeout=300,
-    )
+    data, command = json.dumps(list(documents)).encode(), [sys.executable, __file__]
+    done = subprocess.run(command, input=data, capture_output=True, check=True, timeout=300)
     verdicts: list[dict[str, str]] = json.loads(done.stdout.splitlines()[-1])
     return verdicts
 
@@ -48,18 +42,14 @@ def _main() -> None:
     import pinocchio as pin  # noqa: PLC0415
     from yourdfpy import URDF  # noqa: PLC0415
 
-    def yourdfpy(document: bytes) -> None:
-        URDF.load(io.BytesIO(document), build_scene_graph=False, load_meshes=False)
-
-    def pinocchio(document: bytes) -> None:
-        pin.buildModelFromXML(document.decode("utf-8", "surrogateescape"))
-
-    verdicts = []
-    for text in json.load(sys.stdin):
-        document = text.encode()
-        verdicts.append(
-            {"pinocchio": _in_a_fork(pinocchio, document), "yourdfpy": _in_a_fork(yourdfpy, document)}
-        )
+    questions: dict[str, Callable[[bytes], object]] = {
+        "pinocchio": lambda x: pin.buildModelFromXML(x.decode("utf-8", "surrogateescape")),
+        "yourdfpy": lambda x: URDF.load(io.BytesIO(x), build_scene_graph=False, load_meshes=False),
+    }
+    verdicts = [
+        {name: _in_a_fork(question, text.encode()) for name, question in questions.items()}
+        for text in json.load(sys.stdin)
+    ]
     sys.stdout.write("\n" + json.dumps(verdicts) + "\n")
 
 

@@ -33,8 +33,7 @@ def test_random_tokens(tokens: list[bytes]) -> None:
 def test_documents_with_a_piece_replaced(document: bytes, data: st.DataObject) -> None:
     start = data.draw(st.integers(0, len(document)))
     length = data.draw(st.integers(0, 40))
-    piece = data.draw(st.sampled_from([*TOKENS, b""]))
-    mutant = document[:start] + piece + document[start + length :]
+    mutant = document[:start] + data.draw(st.sampled_from([*TOKENS, b""])) + document[start + length :]
     findings = check_text(mutant)
     assert list(findings) == sorted(findings, key=lambda finding: (finding.line, finding.column))
     assert findings == check_text(mutant)

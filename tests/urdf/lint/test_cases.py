@@ -38,8 +38,7 @@ def test_the_findings_stand_on_their_lines(case: Case) -> None:
 def test_the_column_points_at_what_is_meant(case: Case) -> None:
     lines = re.split(rb"\r\n|\r|\n", case.data)
     for finding in check(case.data):
-        line = lines[finding.line - 1].decode("utf-8", "replace")
-        assert 1 <= finding.column <= len(line) + 1
+        assert 1 <= finding.column <= len(lines[finding.line - 1].decode("utf-8", "replace")) + 1
 
 
 def test_every_error_and_warning_says_what_was_found_or_what_to_do() -> None:

@@ -9,6 +9,7 @@ import jsonschema
 import pytest
 
 from tests.urdf.lint.cases import CASES
+from tests.urdfs import joint, robot
 from urdfkin.errors import UrdfkinError
 from urdfkin.urdf.findings import Reporter
 from urdfkin.urdf.lint import Finding, PinocchioReading, Severity, UrdfError, check, check_text
@@ -32,8 +33,7 @@ def test_a_finding_is_plain_data() -> None:
 
 
 def test_an_error_carries_all_findings_and_prints_the_first() -> None:
-    findings = check('<robot name="r">' + '<link name="a"/>' * 9 + "</robot>")
-    error = UrdfError(findings)
+    error = UrdfError(check('<robot name="r">' + '<link name="a"/>' * 9 + "</robot>"))
     assert isinstance(error, UrdfkinError)
     assert len(error.findings) == 8
     assert str(error).startswith("<text>: the URDF has 8 errors; run 'urdfkin explain URDF402' for details")
@@ -53,42 +53,30 @@ def test_a_name_cannot_act_on_a_terminal(evil: str) -> None:
 
 
 def test_many_warnings_of_one_kind_are_folded_and_the_weightiest_stays() -> None:
-    joints = "".join(
-        f'<joint name="j{i}" type="fixed"><parent link="a"/><child link="b{i}"/>'
-        f'<origin xyz="{100 + 100 * (i == 3)} 0 0"/></joint>\n'
-        for i in range(6)
-    )
-    links = '<link name="a"/>' + "".join(f'<link name="b{i}"/>' for i in range(6))
-    text = f'<robot name="r">\n{links}\n{joints}</robot>'.encode()
+    far = (f'xyz="{100 + 100 * (i == 3)} 0 0"' for i in range(6))
+    joints = (joint(f"j{i}", "fixed", "a", f"b{i}", origin, "") for i, origin in enumerate(far))
+    text = robot(*joints).replace("<joint", "\n<joint").encode()
     (folded,) = check_text(text)
-    assert (folded.name, folded.also) == ("j3", (3, 4, 5, 7, 8))
+    assert (folded.name, folded.also) == ("j3", (2, 3, 4, 6, 7))
     assert len(check_text(text, fold=False)) == 6
 
 
 def test_with_mimic_off_what_is_wrong_with_it_is_a_note() -> None:
-    text = (
-        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/><mimic joint="nobody"/></joint></robot>'
-    )
+    text = robot(joint("j", "continuous", "a", "b", axis="", more='<mimic joint="nobody"/>'))
     assert [f.severity for f in check(text)] == [Severity.ERROR]
     assert [f.severity for f in check(text, mimic=False)] == [Severity.NOTE]
 
 
-@pytest.mark.parametrize(("tag", "name"), [("link", "universe"), ("joint", "root_joint")])
-def test_names_a_root_joint_needs_are_errors_when_there_is_one(tag: str, name: str) -> None:
-    link, joint = (name, "j") if tag == "link" else ("b", name)
-    text = (
-        f'<robot name="r"><link name="a"/><link name="{link}"/><joint name="{joint}" type="fixed">'
-        f'<parent link="a"/><child link="{link}"/></joint></robot>'
-    )
+@pytest.mark.parametrize(("link", "name"), [("universe", "j"), ("b", "root_joint")])
+def test_names_a_root_joint_needs_are_errors_when_there_is_one(link: str, name: str) -> None:
+    text = robot(joint(name, "fixed", "a", link, axis=""))
     assert [f.severity for f in check(text)] == [Severity.WARNING]
     assert [f.severity for f in check(text, root_joint="floating")] == [Severity.ERROR]
 
 
 def test_what_pinocchio_refuses_is_marked() -> None:
-    text = '<robot name="r"><link name="a"/><link name="b"/>{}</robot>'
-    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0\t0 1"/></joint>'
-    assert [f.oracle for f in check(text.format(joint))] == [PinocchioReading.REFUSES]
+    text = robot(joint("j", "fixed", "a", "b", 'xyz="0\t0 1"', axis=""))
+    assert [f.oracle for f in check(text)] == [PinocchioReading.REFUSES]
 
 
 # -- the machine formats say what the findings say; SARIF keeps to its schema --------------------------------

@@ -18,18 +18,14 @@ from tests.urdf.lint.others import ask
 from urdfkin.errors import UnknownNameError
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import WRITTEN_OUT, Rule
-from urdfkin.urdf.lint import DEFAULT_LIMITS, Limits, Severity, check, rules
+from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Limits, Severity, check, rules
 from urdfkin.urdf.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
 
 HERE = Path(rules.__file__).parent
 EVERY_RULE = pytest.mark.parametrize("rule", RULES.values(), ids=lambda rule: rule.id)
 
 
-def limits_for(rule: Rule) -> Limits:
-    """Three codes are only seen in small examples with a limit lowered, one with a limit raised."""
-    return _LIMITS.get(rule.slug, DEFAULT_LIMITS)
-
-
+#: Three codes are only seen in small examples with a limit lowered, one with a limit raised.
 _LIMITS = {
     "too-deep-for-pinocchio": Limits(depth=5_000),
     "too-large": Limits(bytes=100),
@@ -38,30 +34,33 @@ _LIMITS = {
 }
 
 
+def told(rule: Rule, example: str) -> list[Finding]:
+    return check(document(example).encode(), limits=_LIMITS.get(rule.slug, DEFAULT_LIMITS))
+
+
 @EVERY_RULE
 def test_the_bad_example_has_the_finding(rule: Rule) -> None:
-    findings = check(document(page(rule.id).example).encode(), limits=limits_for(rule))
+    findings = told(rule, page(rule.id).example)
     assert rule.id in [finding.code for finding in findings], findings
 
 
 @EVERY_RULE
 def test_the_bad_example_of_an_error_is_refused_and_of_others_is_not(rule: Rule) -> None:
-    findings = check(document(page(rule.id).example).encode(), limits=limits_for(rule))
-    assert any(f.severity.value == "error" for f in findings) == (
-        rule.severity.value == "error" or rule.slug == "stray-text"
+    findings = told(rule, page(rule.id).example)
+    assert any(f.severity is Severity.ERROR for f in findings) == (
+        rule.severity is Severity.ERROR or rule.slug == "stray-text"
     ), findings
 
 
 @EVERY_RULE
 def test_the_good_example_has_no_error_and_not_this_finding(rule: Rule) -> None:
-    findings = check(document(page(rule.id).cure).encode(), limits=limits_for(rule))
-    assert not [f for f in findings if f.severity.value == "error" or f.code == rule.id], findings
+    findings = told(rule, page(rule.id).cure)
+    assert not [f for f in findings if f.severity is Severity.ERROR or f.code == rule.id], findings
 
 
 @EVERY_RULE
 def test_the_oracles_mark_stands_on_the_finding(rule: Rule) -> None:
-    findings = check(document(page(rule.id).example).encode(), limits=limits_for(rule))
-    assert {f.oracle for f in findings if f.code == rule.id} == {rule.oracle}
+    assert {f.oracle for f in told(rule, page(rule.id).example) if f.code == rule.id} == {rule.oracle}
 
 
 @EVERY_RULE
@@ -163,7 +162,6 @@ def test_a_robot_is_told_a_handful_of_things_at_most() -> None:
 
 
 # -- what a comment silences is not warned of; what it cannot change stays as it is --------------------------
-
 
 COMMENT = "<!-- urdfkin: ignore[{}] as drawn -->\n"
 

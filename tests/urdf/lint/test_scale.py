@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+from tests import urdfs
 from urdfkin.urdf.lint import Finding, Limits, check_text
 
 pytestmark = pytest.mark.long
@@ -12,11 +13,11 @@ MANY = 50_000
 
 
 def chain(length: int, back: str = "", mimic: bool = False) -> bytes:
+    follow = '<mimic joint="j{}"/>' if mimic else ""
     links = "".join(f'<link name="l{i}"/>\n' for i in range(length + 1))
-    follow = '<mimic joint="j{}"/>' if mimic else "{}"
     joints = "".join(
-        f'<joint name="j{i}" type="continuous"><parent link="l{i}"/><child link="l{i + 1}"/>'
-        f"{follow.format(i - 1 if mimic else '') if i else ''}</joint>\n"
+        urdfs.joint(f"j{i}", "continuous", f"l{i}", f"l{i + 1}", axis="", more=follow.format(i - 1) * (i > 0))
+        + "\n"
         for i in range(length)
     )
     return f'<robot name="r">\n{links}{joints}{back}</robot>'.encode()
@@ -47,10 +48,7 @@ def test_a_chain_of_50000_mimics_is_resolved_in_linear_time() -> None:
 
 
 def test_50000_unknown_links_do_not_search_for_suggestions_forever() -> None:
-    joints = "".join(
-        f'<joint name="j{i}" type="fixed"><parent link="x{i}"/><child link="l{i}"/></joint>'
-        for i in range(5_000)
-    )
+    joints = "".join(urdfs.joint(f"j{i}", "fixed", f"x{i}", f"l{i}", axis="") for i in range(5_000))
     links = "".join(f'<link name="l{i}"/>' for i in range(5_000))
     findings = timed(f'<robot name="r">{links}{joints}</robot>'.encode())
     assert sum(finding.count for finding in findings) == 5_000
@@ -59,13 +57,10 @@ def test_50000_unknown_links_do_not_search_for_suggestions_forever() -> None:
 @pytest.mark.parametrize(
     ("limits", "code"),
     [
-        (Limits(bytes=10), "URDF108"),
-        (Limits(elements=1), "URDF114"),
-        (Limits(depth=1), "URDF115"),
-        (Limits(attributes=0), "URDF116"),
-        (Limits(name=2), "URDF117"),
+        (Limits(bytes=10), "URDF108"), (Limits(elements=1), "URDF114"), (Limits(depth=1), "URDF115"),
+        (Limits(attributes=0), "URDF116"), (Limits(name=2), "URDF117"),
     ],
-)
+)  # fmt: skip
 def test_each_limit_refuses_and_says_how_to_raise_it(limits: Limits, code: str) -> None:
     (finding,) = check_text(b'<robot name="r"><link name="a"/></robot>', limits=limits)
     assert finding.code == code

@@ -2,6 +2,8 @@
 
 from tests.urdf.lint.cases.arm import ACCEPT, BALL, REJECT, WARN, Case, arm, base_link, inertial, shape
 
+_RED = '<material name="m"><color rgba="1 0 0 1"/></material>'
+
 CASES = [
     # Inertials.
     Case("inertial-right", inertial(BALL), ACCEPT),
@@ -25,14 +27,7 @@ CASES = [
     Case("mesh-no-file", base_link(shape("<mesh/>")), WARN, "URDF705:3"),
     # Materials.
     Case("material-twice", arm(more='<material name="a"/><material name="a"/>'), REJECT, "URDF709:8"),
-    Case(
-        "material-inside",
-        base_link(
-            '<visual><geometry><box size="1 1 1"/></geometry>'
-            '<material name="m"><color rgba="1 0 0 1"/></material></visual>'
-        ),
-        ACCEPT,
-    ),
+    Case("material-inside", base_link(shape('<box size="1 1 1"/>').replace("</v", f"{_RED}</v")), ACCEPT),
     # Meshes.
     Case("mesh-https", base_link(shape('<mesh filename="https://x.org/a.stl"/>')), WARN, "URDF707:3"),
     Case("mesh-package", base_link(shape('<mesh filename="package://no_such_pkg/a"/>')), WARN, "URDF706:3"),

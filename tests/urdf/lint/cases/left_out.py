@@ -30,6 +30,13 @@ def _two(
 </mujoco>"""
 
 
+_RADIANS = '<compiler angle="radian"/>'
+
+
+def _hinge(ends: str, **parts: str) -> str:
+    return _two(joint=f'type="hinge" limited="true" range="{ends}"', **parts)
+
+
 def _held(*equalities: str) -> str:
     return _two(more=f"<equality>{''.join(equalities)}</equality>")
 
@@ -37,17 +44,17 @@ def _held(*equalities: str) -> str:
 _USELESS = "left out, since kinematics does not use them: "
 _SPATIAL = '<tendon><spatial name="t"><site site="s"/><site site="r"/></spatial></tendon>'
 
+_MOTOR = '<actuator><motor joint="a"/></actuator>'
+
 CASES = [
     Mjcf("nothing", _two()),
     Mjcf("a-line-between-two-joints", _held('<joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/>')),
     Mjcf(
-        "a-weld",
-        _held('<weld name="glue" body1="one" body2="two"/>'),
+        "a-weld", _held('<weld name="glue" body1="one" body2="two"/>'),
         "MJCF101 equality glue: a constraint (weld of one and two) that a tree cannot represent",
     ),
     Mjcf(
-        "a-connection",
-        _held('<connect name="pin" body1="one" body2="two" anchor="0 0 0"/>'),
+        "a-connection", _held('<connect name="pin" body1="one" body2="two" anchor="0 0 0"/>'),
         "MJCF101 equality pin: a constraint (connect of one and two) that a tree cannot represent",
     ),
     Mjcf(
@@ -66,46 +73,31 @@ CASES = [
         "MJCF101 equality y: joint a has two rules, or its rules form a circle",
     ),
     Mjcf(
-        "a-constraint-that-is-off",
-        _held('<joint name="x" joint1="b" joint2="a" active="false"/>'),
+        "a-constraint-that-is-off", _held('<joint name="x" joint1="b" joint2="a" active="false"/>'),
         "MJCF102 equality x: a constraint that is not active",
     ),
     Mjcf(
-        "a-tendon",
-        _two(inside='<site name="s"/>', world='<site name="r"/>', more=_SPATIAL),
-        "MJCF101 tendon: tendons have no effect here",
-        f"MJCF102 {_USELESS}1 tendons",
+        "a-tendon", _two(inside='<site name="s"/>', world='<site name="r"/>', more=_SPATIAL),
+        "MJCF101 tendon: tendons have no effect here", f"MJCF102 {_USELESS}1 tendons",
     ),
     Mjcf(
-        "a-mocap-body",
-        _two(world='<body name="hand" mocap="true"/>'),
+        "a-mocap-body", _two(world='<body name="hand" mocap="true"/>'),
         "MJCF101 body hand: a mocap body is fixed at its pose in the file",
     ),
     Mjcf(
-        "a-slide-without-limits",
-        _two(joint='type="slide"'),
+        "a-slide-without-limits", _two(joint='type="slide"'),
         "MJCF102 joint b: a slide joint without limits: the URDF, which requires limits, has +-1000 m",
     ),
     Mjcf(
-        "radians-in-a-file-in-degrees",
-        _two(joint='type="hinge" limited="true" range="-1.5 3.1416"'),
+        "radians-in-a-file-in-degrees", _hinge("-1.5 3.1416"),
         "MJCF201 compiler: the largest limit of a hinge is 3.142 degrees: the limits are probably radians",
     ),
-    Mjcf(
-        "ten-turns-in-a-file-in-radians",
-        _two(joint='type="hinge" limited="true" range="-63 63"', more='<compiler angle="radian"/>'),
-    ),
-    Mjcf(
-        "radians-in-a-file-in-radians",
-        _two(joint='type="hinge" limited="true" range="-0.1 0.1"', more='<compiler angle="radian"/>'),
-    ),
-    Mjcf("a-hinge-of-90-degrees", _two(joint='type="hinge" limited="true" range="-90 90"')),
+    Mjcf("ten-turns-in-a-file-in-radians", _hinge("-63 63", more=_RADIANS)),
+    Mjcf("radians-in-a-file-in-radians", _hinge("-0.1 0.1", more=_RADIANS)),
+    Mjcf("a-hinge-of-90-degrees", _hinge("-90 90")),
     Mjcf(
         "a-hinge-of-five-degrees-beside-one-of-90",
-        _two(
-            joint='type="hinge" limited="true" range="-5 5"',
-            inside='<joint name="c" limited="true" range="-90 0"/>',
-        ),
+        _hinge("-5 5", inside='<joint name="c" limited="true" range="-90 0"/>'),
     ),
     Mjcf(
         "a-free-body-that-stands-elsewhere",
@@ -115,10 +107,7 @@ CASES = [
     ),
     Mjcf(
         "shapes-lights-and-motors",
-        _two(
-            inside='<geom size="0.1"/><geom size="0.2"/><light/><camera/>',
-            more='<actuator><motor joint="a"/></actuator>',
-        ),
+        _two(inside='<geom size="0.1"/><geom size="0.2"/><light/><camera/>', more=_MOTOR),
         f"MJCF102 {_USELESS}1 actuators, 2 geoms, 1 cameras, 1 lights",
     ),
-]
+]  # fmt: skip

@@ -4,28 +4,27 @@ from tests.urdf.lint.cases.arm import ACCEPT, REJECT, WARN, Case, arm, axis, bou
 
 _PLAIN = arm()
 
+#: An external DTD, or an entity that reads a file.
+_DEFAULT = '<!DOCTYPE robot [<!ATTLIST origin xyz CDATA "9 9 9">]>'
+_ENTITY = '<!DOCTYPE r [<!ENTITY % p SYSTEM "file:///etc/passwd">%p;]>'
+
 _UTF16 = _PLAIN.replace("<?xml", '<?xml encoding="UTF-16"').encode("utf-16")
 
 _BAD = {
-    "infinity": "inf 0 0",
-    "negative-infinity": "-Infinity 0 0",
-    "overflow": "1e400 0 0",
-    "comma-decimal": "0,5 0 0",
-    "commas": "0,0,1",
-    "underscore": "1_0 0 0",
-    "plus-plus": "++1 0 0",
-    "no-mantissa": "e5 0 0",
-    "no-exponent": "1e 0 0",
-    "only-a-point": ". 0 0",
-    "octal": "0o7 0 0",
-    "fraction": "1/2 0 0",
-    "expression": "pi/2 0 0",
-    "wide-digits": "\uff11 0 0",
-    "unicode-minus": "\u22121 0 0",
-    "no-break-space": "0\u00a00 1",
-    "unit": "100mm 0 0",
+    "infinity": "inf 0 0", "negative-infinity": "-Infinity 0 0", "overflow": "1e400 0 0",
+    "comma-decimal": "0,5 0 0", "commas": "0,0,1", "underscore": "1_0 0 0", "plus-plus": "++1 0 0",
+    "no-mantissa": "e5 0 0", "no-exponent": "1e 0 0", "only-a-point": ". 0 0", "octal": "0o7 0 0",
+    "fraction": "1/2 0 0", "expression": "pi/2 0 0", "wide-digits": "\uff11 0 0",
+    "unicode-minus": "\u22121 0 0", "no-break-space": "0\u00a00 1", "unit": "100mm 0 0",
     "hex-float": "0x1p-3 0 0",
-}
+}  # fmt: skip
+
+_NEW = 'name="r" version="1.2"'
+
+
+def origin(attributes: str, version: str = "1.0") -> str:
+    return arm(robot=f'name="r" version="{version}"', origin=f"<origin {attributes}/>")
+
 
 CASES = [
     # Bytes.
@@ -64,18 +63,8 @@ CASES = [
     Case("doctype-system", '<!DOCTYPE robot SYSTEM "a.dtd">' + arm(head=""), REJECT, "URDF106:1"),
     Case("doctype-public", '<!DOCTYPE robot PUBLIC "p" "a.dtd">' + arm(head=""), REJECT),
     Case("doctype-empty-subset", "<!DOCTYPE robot []>" + arm(head=""), REJECT, "URDF106:1"),
-    Case(
-        "doctype-attribute-default",
-        '<!DOCTYPE robot [<!ATTLIST origin xyz CDATA "9 9 9">]>' + arm(head=""),
-        REJECT,
-        "URDF106:1",
-    ),
-    Case(
-        "parameter-entity",
-        '<!DOCTYPE r [<!ENTITY % p SYSTEM "file:///etc/passwd">%p;]>' + arm(head=""),
-        REJECT,
-        "URDF106:1",
-    ),
+    Case("doctype-attribute-default", _DEFAULT + arm(head=""), REJECT, "URDF106:1"),
+    Case("parameter-entity", _ENTITY + arm(head=""), REJECT, "URDF106:1"),
     Case("nested-600", arm(more="<a>" * 600 + "</a>" * 600), REJECT, "URDF115:8"),
     Case("nested-100000", arm(more="<a>" * 100_000), REJECT, "URDF115:8"),
     Case("nested-100", arm(more="<a>" * 100 + "</a>" * 100), WARN),
@@ -95,27 +84,16 @@ CASES = [
     Case("limit-empty", bounds('lower="" upper="1"'), REJECT, "URDF301:6"),
     Case("limit-two-numbers", bounds('lower="-1 1" upper="1"'), REJECT),
     Case("effort-infinite", limit('lower="-1" upper="1" effort="inf" velocity="1"'), REJECT),
-    Case(
-        "attribute-on-a-later-line", arm(origin='<origin\n rpy="0 0 0"\n xyz="a b c"/>'), REJECT, "URDF301:8"
-    ),
+    Case("attribute-on-a-later-line", origin('\n rpy="0 0 0"\n xyz="a b c"'), REJECT, "URDF301:8"),
     Case("damping-no-number", arm(inside='<dynamics damping="x"/>'), REJECT, "URDF301:6"),
     Case("calibration-no-number", arm(inside='<calibration rising="x"/>'), REJECT, "URDF301:6"),
     Case("calibration-empty", arm(inside="<calibration/>"), ACCEPT),
     Case("dynamics-one-is-enough", arm(inside='<dynamics friction="0.1"/>'), ACCEPT),
     Case("axis-nan", axis("0 0 nan"), REJECT, "URDF301:6"),
-    Case(
-        "quaternion-three",
-        arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1"/>'),
-        REJECT,
-        "URDF302:6",
-    ),
+    Case("quaternion-three", origin('quat_xyzw="0 0 1"', "1.1"), REJECT, "URDF302:6"),
     Case("mimic-nan", follows('joint="j1" multiplier="nan"'), REJECT, "URDF301:7"),
     # What joints are made of.
-    Case(
-        "version-1.2-needs-no-effort",
-        arm(robot='name="r" version="1.2"', limit='<limit lower="-1" upper="1"/>'),
-        WARN,
-    ),
+    Case("version-1.2-needs-no-effort", arm(robot=_NEW, limit='<limit lower="-1" upper="1"/>'), WARN),
     Case("no-child", arm(ends='<parent link="base"/>'), REJECT, "URDF210:6"),
     Case("child-without-link", arm(ends='<parent link="base"/><child/>'), REJECT, "URDF211:6"),
     Case("no-type", arm(attributes=""), REJECT, "URDF211:6"),
@@ -130,23 +108,8 @@ CASES = [
     Case("prismatic-without-limit", arm(attributes='type="prismatic"', limit=""), REJECT, "URDF506:6"),
     Case("limit-no-effort", limit('lower="-1" upper="1" velocity="1"'), REJECT, "URDF211:6"),
     Case("limit-partial-on-fixed", arm(attributes='type="fixed"', limit='<limit lower="0"/>'), REJECT),
-    Case(
-        "version-1.2-needs-both-bounds",
-        arm(robot='name="r" version="1.2"', limit='<limit lower="-1"/>'),
-        REJECT,
-        "URDF211:6",
-    ),
-    Case(
-        "quaternion-zero",
-        arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 0 0"/>'),
-        REJECT,
-        "URDF513:6",
-    ),
-    Case(
-        "quaternion-beside-rpy",
-        arm(robot='name="r" version="1.1"', origin='<origin rpy="0 0 0" quat_xyzw="0 0 0 1"/>'),
-        REJECT,
-        "URDF513:6",
-    ),
+    Case("version-1.2-needs-both-bounds", arm(robot=_NEW, limit='<limit lower="-1"/>'), REJECT, "URDF211:6"),
+    Case("quaternion-zero", origin('quat_xyzw="0 0 0 0"', "1.1"), REJECT, "URDF513:6"),
+    Case("quaternion-beside-rpy", origin('rpy="0 0 0" quat_xyzw="0 0 0 1"', "1.1"), REJECT, "URDF513:6"),
     Case("mimic-empty-joint", arm(follow='<mimic joint=""/>'), REJECT, "URDF211:7"),
 ]
