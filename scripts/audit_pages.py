@@ -173,8 +173,8 @@ def fleet_pages(folder: Path) -> Iterator[Page]:
 
 def site(folder: Path) -> Iterator[Page]:
     """Build the documentation site and yield some of its pages."""
-    from mkdocs.commands.build import build  # noqa: PLC0415  the extra `docs` has this library
-    from mkdocs.config import load_config  # noqa: PLC0415
+    from mkdocs.commands.build import build
+    from mkdocs.config import load_config
 
     logging.getLogger("mkdocs").setLevel(logging.ERROR)
     config = load_config(str(ROOT / "mkdocs.yml"), site_dir=str(folder / "site"), strict=False)
@@ -202,8 +202,8 @@ def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
 
 @contextmanager
 def viewer(plays: bool = False) -> Iterator[Page]:
-    from urdfkin.view.server import new_server  # noqa: PLC0415  the extra `view` has its library
-    from urdfkin.view.viewer import Viewer  # noqa: PLC0415
+    from urdfkin.view.server import new_server
+    from urdfkin.view.viewer import Viewer
 
     server = new_server(port=8097)
     try:

@@ -102,7 +102,7 @@ def main(words: Sequence[str] | None = None) -> int:
     if given.json:
         given.json.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
     if given.plot:
-        from scripts.benchmarking.picture import draw  # noqa: PLC0415  the picture needs matplotlib
+        from scripts.benchmarking.picture import draw
 
         given.plot.write_bytes(draw(figures, given.plot))
     return 0

@@ -137,8 +137,8 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
 def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
     """Yield JSON lines of PyTorch's export and of PyTorch Kinematics; raise ValueError for a wrong number."""
     try:
-        import torch  # noqa: PLC0415  this library is optional
-        from torch.utils.benchmark import Timer  # noqa: PLC0415
+        import torch
+        from torch.utils.benchmark import Timer
     except ModuleNotFoundError:
         return
     if device == "cuda" and not torch.cuda.is_available():
@@ -164,8 +164,8 @@ def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") ->
 
 def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
     """Return PyTorch Kinematics' Jacobian of the path; raise ValueError if it is not that of `robot`."""
-    import pytorch_kinematics  # noqa: PLC0415  this library is optional
-    import torch  # noqa: PLC0415
+    import pytorch_kinematics
+    import torch
 
     chain = pytorch_kinematics.build_serial_chain_from_urdf(robot.urdf, frame)
     names = chain.get_joint_parameter_names()

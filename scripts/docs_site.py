@@ -106,7 +106,7 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    from mkdocs.structure.files import File  # noqa: PLC0415  the extra `docs` has this library
+    from mkdocs.structure.files import File
 
     made = {"cli.md": commands_page(), "api.md": library_page()}
     made |= {page: subject_page(page) for page in LIBRARY}
@@ -130,7 +130,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def on_page_content(content: str, **_: Any) -> str:
-    from latex2mathml.converter import convert  # noqa: PLC0415  the extra `docs` has this library
+    from latex2mathml.converter import convert
 
     def mathml(found: re.Match[str]) -> str:
         alone = found[0].startswith("<p>") and found[0].endswith("</p>")

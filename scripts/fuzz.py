@@ -99,7 +99,7 @@ class Worker:
 
 def work(seed: int, pipe: Connection) -> None:
     """Run as the worker process: receive a family and a number, send the outcome, and repeat."""
-    from scripts.fuzzing.judge import judge  # noqa: PLC0415  only the worker needs the compiler
+    from scripts.fuzzing.judge import judge
 
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)

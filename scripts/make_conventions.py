@@ -387,7 +387,7 @@ def _cells(how: Convention) -> dict[str, str]:
 
 
 def measure() -> None:
-    from tests.model.conventions.libraries import LIBRARIES  # noqa: PLC0415  this module needs pytest
+    from tests.model.conventions.libraries import LIBRARIES
 
     for name, library in LIBRARIES.items():
         package = _DISTRIBUTIONS.get(name, name)
@@ -405,7 +405,7 @@ def measure() -> None:
 
 def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
     """Return the number of robots on which a library agrees with urdfkin, and the largest difference."""
-    from tests.model.conventions.test_libraries import _conversion, _differences, _loaded  # noqa: PLC0415
+    from tests.model.conventions.test_libraries import _conversion, _differences, _loaded
 
     agree, worst, share, robots = 0, 0.0, 0.0, sorted(catalogue())
     for name_of_robot in robots:

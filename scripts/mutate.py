@@ -197,7 +197,7 @@ def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, s
 
 def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
     """Inject a mutant into this new process and its children, run the tests, and exit with pytest's code."""
-    import pytest  # noqa: PLC0415  only child processes run tests
+    import pytest
 
     hook = ROOT / "scripts" / "mutating" / "hook"
     paths = [str(hook), str(ROOT), os.environ.get("PYTHONPATH", "")]

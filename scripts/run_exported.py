@@ -22,7 +22,7 @@ def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float
     """Yield the largest error of each check as a share of its bound; 0 or inf for a check without one."""
     scope = runpy.run_path(path)
     if library == "jax":
-        import jax  # noqa: PLC0415
+        import jax
 
         jax.config.update("jax_enable_x64", True)
     any_library = path.endswith("_array.py")
@@ -44,12 +44,12 @@ def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float
 def of_hessian(scope: dict[str, Any], library: str) -> float:
     """Return the largest error of the Jacobian's derivatives as a share of the Hessian's bound."""
     if library == "torch":
-        import torch  # noqa: PLC0415
+        import torch
 
         q = torch.tensor(scope["GIVEN"]["q"], dtype=torch.float64)
         slopes = torch.func.vmap(torch.func.jacrev(scope["jacobian"]))
     else:
-        import jax  # noqa: PLC0415
+        import jax
 
         q, slopes = jax.numpy.array(scope["GIVEN"]["q"]), jax.vmap(jax.jacrev(scope["jacobian"]))
     found = slopes(q).reshape(len(q), -1).tolist()
@@ -57,7 +57,7 @@ def of_hessian(scope: dict[str, Any], library: str) -> float:
 
 
 def of_compiled(scope: dict[str, Any]) -> float:
-    import torch  # noqa: PLC0415
+    import torch
 
     found = 0.0
     for name, letters in scope["INPUTS"].items():

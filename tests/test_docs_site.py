@@ -29,8 +29,8 @@ ROOT = DOCS.parent
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Built as `make site` builds it."""
-    from mkdocs.commands.build import build  # noqa: PLC0415  of the extra `docs`
-    from mkdocs.config import load_config  # noqa: PLC0415
+    from mkdocs.commands.build import build
+    from mkdocs.config import load_config
 
     folder = tmp_path_factory.mktemp("site")
     logging.getLogger("mkdocs").setLevel(logging.WARNING)
@@ -183,7 +183,7 @@ def test_a_lesson_is_a_notebook_with_what_it_prints(page: str) -> None:
 
 @pytest.mark.long
 def test_a_doctest_in_a_docstring_is_a_block_of_code() -> None:
-    from scripts.docs_docstrings import fenced  # noqa: PLC0415  imports griffe, of the extra `docs`
+    from scripts.docs_docstrings import fenced
 
     shown = "It adds.\n\n```pycon\n>>> add(1,\n...     2)\n3\n```\n\nAnd so on."
     assert fenced("It adds.\n\n>>> add(1,\n...     2)\n3\n\nAnd so on.") == shown

@@ -167,7 +167,7 @@ def test_what_pinocchio_cannot_check_is_handed_out_with_a_warning_and_never_as_v
 
 
 def test_a_result_that_is_no_number_is_a_disagreement(monkeypatch: pytest.MonkeyPatch, panda: Robot) -> None:
-    from urdfkin.compiled import evaluate  # noqa: PLC0415
+    from urdfkin.compiled import evaluate
 
     monkeypatch.setattr(evaluate, "jacobians", lambda plan, q, *_, **__: np.full((len(q), 1, 6, 8), np.nan))
     with pytest.raises(urdfkin.VerificationError, match="disagrees"):

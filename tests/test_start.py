@@ -217,7 +217,7 @@ def test_every_section_of_the_chapter_has_its_place() -> None:
 @pytest.mark.slow
 def test_the_pictures_can_be_drawn_again(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    from scripts import make_tour  # noqa: PLC0415  needs the extra
+    from scripts import make_tour
 
     make_tour.main(tmp_path)
     drawn = {path.name for path in tmp_path.iterdir()}

@@ -190,7 +190,7 @@ def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
     """Yield the calls of dynibo: rows [angular; linear], joints breadth first, matrices column by column."""
-    import dynibo  # noqa: PLC0415
+    import dynibo
 
     robot = dynibo.Robot.from_urdf(str(subject.file))
     nv, order = subject.nv, positions(subject.robot.joint_names, breadth_first(subject.urdf))
@@ -231,7 +231,7 @@ def _link(joint: ET.Element, tag: str) -> str:
 
 def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
     """Yield the calls of MuJoCo, with rows [angular; linear] and without merged links (`fusestatic`)."""
-    import mujoco  # noqa: PLC0415
+    import mujoco
 
     flags = {"fusestatic": "false", "discardvisual": "true"}
     model = mujoco.MjModel.from_xml_string(bare_urdf(subject.urdf, flags=flags))
@@ -266,9 +266,9 @@ def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
     """Yield the calls of Drake: rows [angular; linear]; an acceleration is J a plus a velocity term."""
-    from pydrake.multibody.parsing import Parser  # noqa: PLC0415
-    from pydrake.multibody.plant import MultibodyPlant  # noqa: PLC0415
-    from pydrake.multibody.tree import JacobianWrtVariable  # noqa: PLC0415
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.multibody.tree import JacobianWrtVariable
 
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModelsFromString(subject.urdf, "urdf")
@@ -303,7 +303,7 @@ def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
     """Yield the calls of the Robotics Toolbox: `jacob0`, and an acceleration as J a + Jdot v."""
-    import roboticstoolbox as rtb  # noqa: PLC0415
+    import roboticstoolbox as rtb
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the library warns that its URDF reader is deprecated
@@ -338,8 +338,8 @@ _SINGLE = 1e-6
 
 def torch(subject: Subject, quantity: str) -> Iterator[Work]:
     """Yield Jacobians of PyTorch Kinematics, with and without `torch.compile`; it has no accelerations."""
-    import pytorch_kinematics as pk  # noqa: PLC0415
-    import torch  # noqa: PLC0415
+    import pytorch_kinematics as pk
+    import torch
 
     if quantity != "jacobian":
         return
@@ -362,8 +362,8 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
 
 def jax(subject: Subject, quantity: str) -> Iterator[Work]:
     """Yield the textbook's equations on JAX arrays in float64, compiled for a batch by `vmap` and XLA."""
-    import jax  # noqa: PLC0415
-    import jax.numpy as jnp  # noqa: PLC0415
+    import jax
+    import jax.numpy as jnp
 
     jax.config.update("jax_enable_x64", True)  # float64, as in all contenders
     array, plan = jnp.asarray, subject.plan

@@ -110,7 +110,7 @@ def _listed(numbers: Sequence[float]) -> str:
 
 def _straight_line(plan: CompiledTree, quantity: str) -> str:
     """Return CasADi's C code of a function of (x, sines, cosines, v, a) for one configuration."""
-    import casadi  # noqa: PLC0415  this library is optional
+    import casadi
 
     names = [casadi.SX.sym(name, len(plan.steps)) for name in ("x", "sine", "cosine", "v", "a")]
     numbers = results(plan, quantity, *map(casadi.vertsplit, names))

@@ -93,7 +93,7 @@ def _use(model: Robot, frame: str, use: str) -> None:
 
 
 def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dict[str, object]:
-    from scripts.benchmarking.subject import Subject  # noqa: PLC0415  a first use must not import it
+    from scripts.benchmarking.subject import Subject
 
     n = int(count)
     with Subject(robot, frame, n) as subject:

@@ -22,12 +22,12 @@ def poses(form: str, text: str, q: list[list[float]]) -> list[list[list[float]]]
         return [scope["robot"].fkine(one).A.tolist() for one in q]
     place = scope["placement"]
     if form == "sympy":
-        from sympy import Float  # noqa: PLC0415  each format needs one library
+        from sympy import Float
 
         exact = [place([Float(x, 30) for x in one]) for one in q]
         return [[[float(x) for x in row] for row in T.tolist()] for T in exact]
     if form == "casadi":
-        from casadi import DM, SX, Function  # noqa: PLC0415
+        from casadi import DM, SX, Function
 
         symbols = SX.sym("q", len(q[0]))
         function = Function("placement", [symbols], [place(symbols)])

@@ -87,7 +87,7 @@ def test_compiling_runs_nothing_there(
 def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from urdfkin.compiled import preload  # noqa: PLC0415
+    from urdfkin.compiled import preload
 
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend("")  # as in `python -c`

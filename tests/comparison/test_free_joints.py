@@ -130,7 +130,7 @@ def test_a_carriage_that_another_joint_carries_is_a_difference() -> None:
 
 @pytest.mark.slow
 def test_the_schema_knows_conversions_and_orders() -> None:
-    from jsonschema import Draft202012Validator  # noqa: PLC0415
+    from jsonschema import Draft202012Validator
 
     schema = Draft202012Validator(SAME.schema())
     a = loaded(CHAIN.format("planar", "0"))

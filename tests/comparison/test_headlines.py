@@ -51,7 +51,7 @@ def finger(multiplier: float) -> str:
 
 
 def headline(a: str | Robot, b: str | Robot, **asked: float) -> str:
-    from urdfkin.report.same import headline as of  # noqa: PLC0415
+    from urdfkin.report.same import headline as of
 
     return of(urdfkin.same(a, b, **asked), SameQuestion(**asked))  # type: ignore[arg-type]
 
@@ -221,7 +221,7 @@ def test_what_is_renamed_is_held_to_what_is_asked_too() -> None:
 
 
 def test_diff_says_radians_where_nothing_is_moved() -> None:
-    from urdfkin.report.diff import headline as of  # noqa: PLC0415
+    from urdfkin.report.diff import headline as of
 
     a, b = arm(), arm(tool='<origin xyz="0 0 0.1" rpy="0 0 0.02"/>')
     assert of(urdfkin.diff(a, b)) == "1 change; together they turn tcp by up to 20 mrad"

@@ -436,7 +436,7 @@ def test_what_cannot_be_compared_is_refused_in_a_line(words: list[str], said: st
 
 
 def test_the_schema_is_printed_and_is_one() -> None:
-    from jsonschema import Draft202012Validator  # noqa: PLC0415
+    from jsonschema import Draft202012Validator
 
     done = run("same", "--schema")
     Draft202012Validator.check_schema(done.data)

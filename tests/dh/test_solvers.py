@@ -159,7 +159,7 @@ def test_ik_geo_solves_for_the_poses_of_h_and_p(name: str) -> None:
 
 def opw_solver(robot: Robot, tip: str) -> Solve:
     opw = pytest.importorskip("py_opw_kinematics")
-    from scipy.spatial.transform import RigidTransform  # noqa: PLC0415  of SciPy 1.16, which it needs
+    from scipy.spatial.transform import RigidTransform
 
     found = opw_of(robot.chain(tip, robot.base_frame), 1e-9)
     model = opw.KinematicModel(

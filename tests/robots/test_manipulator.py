@@ -52,7 +52,7 @@ def test_all_frames_are_those_asked_for_one_by_one() -> None:
 
 
 def test_a_wrong_rate_of_the_jacobian_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    from urdfkin.compiled import evaluate  # noqa: PLC0415  to be replaced
+    from urdfkin.compiled import evaluate
 
     original = evaluate.jacobian_rates
     monkeypatch.setattr(evaluate, "jacobian_rates", lambda *x, **y: original(*x, **y) * (1.0 + 1e-10))
@@ -66,7 +66,7 @@ def test_a_wrong_rate_of_the_jacobian_is_caught(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.slow
 @pytest.mark.parametrize("representation", [*SEQUENCES, "quaternion"])
 def test_the_manipulator_jacobian_predicts_the_change_of_the_pose(representation: str) -> None:
-    from urdfkin.kinematics.bodies import orientation_of  # noqa: PLC0415
+    from urdfkin.kinematics.bodies import orientation_of
 
     robot = urdfkin.load("ur5")
     q, v, step = robot.sample(1, 7)[0], np.random.default_rng(8).normal(size=6), 1e-4

@@ -292,7 +292,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_description_is_loaded_by_its_name_and_by_its_module(package: Path) -> None:
-    import importlib  # noqa: PLC0415
+    import importlib
 
     assert urdfkin.load("toy_description").name == "polar"
     assert urdfkin.load(importlib.import_module("robot_descriptions.toy_description")).name == "polar"

@@ -446,7 +446,7 @@ def test_references_payloads_and_instances_are_followed(write: Write, arc: str) 
 
 def crate_file(write: Write) -> Path:
     """Write the arm in USD's binary format."""
-    from pxr import Sdf  # noqa: PLC0415
+    from pxr import Sdf
 
     text = write(stage(LINKS + JOINTS))
     assert Sdf.Layer.FindOrOpen(str(text)).Export(str(text.with_suffix(".usdc")))
@@ -455,7 +455,7 @@ def crate_file(write: Write) -> Path:
 
 def package(write: Write) -> Path:
     """Write the arm as a package."""
-    from pxr import UsdUtils  # noqa: PLC0415
+    from pxr import UsdUtils
 
     text = write(stage(LINKS + JOINTS))
     assert UsdUtils.CreateNewUsdzPackage(str(text), str(text.with_suffix(".usdz")))
@@ -794,7 +794,7 @@ def test_many_layers_are_too_large_together(write: Write, monkeypatch: pytest.Mo
 def test_a_stage_of_hundreds_of_layers_is_read_and_one_of_thousands_is_refused(
     write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pxr import Sdf  # noqa: PLC0415
+    from pxr import Sdf
 
     part = Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
     for k in range(200):  # the process may have 64 open files
@@ -898,7 +898,7 @@ def test_a_layer_that_is_a_device_and_a_stage_that_does_not_exist_are_refused(
 
 def slipped(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfkin.Robot:
     """Load a stage in this process, where a slip can be planted."""
-    from urdfkin.verify import usd_process  # noqa: PLC0415
+    from urdfkin.verify import usd_process
 
     def ask(_: list[str], request: bytes, *rest: Any) -> tuple[bytes, int]:
         return json.dumps(usd_process.answer_of(json.loads(request))).encode() + b"\n", 0

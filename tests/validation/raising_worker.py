@@ -19,7 +19,7 @@ def _deep() -> None:
 
 
 def _pinocchio() -> None:
-    import pinocchio as pin  # noqa: PLC0415
+    import pinocchio as pin
 
     pin.forwardKinematics(pin.Model(), None, 1.0)
 

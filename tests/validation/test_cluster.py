@@ -230,7 +230,7 @@ def test_a_robot_that_kills_its_process_is_blamed_and_none_of_its_neighbours(
 
 def _deadly(deaths: str, module: str) -> None:
     """On a worker: the processes that it starts from now on are others."""
-    from urdfkin.validation import remote, worker_processes  # noqa: PLC0415
+    from urdfkin.validation import remote, worker_processes
 
     os.environ["URDFKIN_TEST_DEATHS"] = deaths
     worker_processes.WORKER = module

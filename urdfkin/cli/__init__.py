@@ -187,7 +187,7 @@ class LazyGroup(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
         """Return the commands and options that begin with `incomplete`, without importing a command."""
-        from click.shell_completion import CompletionItem  # noqa: PLC0415  only completion needs this
+        from click.shell_completion import CompletionItem
 
         found = [(name, summary) for name, (_, summary) in commands().items() if name.startswith(incomplete)]
         names = [CompletionItem(name, help=summary) for name, summary in found]
@@ -203,8 +203,8 @@ class LazyGroup(click.Group):
 def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if not wanted:
         return
-    from urdfkin.system.lazy_import import own_version  # noqa: PLC0415
-    from urdfkin.verify.pinocchio import pinocchio, version  # noqa: PLC0415
+    from urdfkin.system.lazy_import import own_version
+    from urdfkin.verify.pinocchio import pinocchio, version
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
     pinocchio()  # This call raises an error if Pinocchio is not installed.

@@ -123,8 +123,8 @@ def command(
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
-    from urdfkin.report.calibration import as_data, document, moved_table  # noqa: PLC0415
-    from urdfkin.report.diff import lines_of  # noqa: PLC0415  --help stays fast
+    from urdfkin.report.calibration import as_data, document, moved_table
+    from urdfkin.report.diff import lines_of
 
     check_writable(output)
     given = [name for name in ("poses", "ur") if context.params[name] is not None]
@@ -171,7 +171,7 @@ def command(
 
 
 def _refusal(found: Calibration) -> ImplausibleError:
-    from urdfkin.calibration.calibrate import ImplausibleError  # noqa: PLC0415
+    from urdfkin.calibration.calibrate import ImplausibleError
 
     if found.plausibility.is_in_degrees:
         return ImplausibleError(found, "if these values are radians, add --radians")
@@ -193,10 +193,10 @@ def _reject_unused(context: click.Context, given: list[str]) -> None:
 
 
 def _run(context: click.Context, robot: Robot) -> Calibration:
-    from urdfkin.calibration.calibrate import fitted_model, read_poses  # noqa: PLC0415
-    from urdfkin.dh.parse_table import is_table_file, read_table_or_screws  # noqa: PLC0415
-    from urdfkin.dh.table import DHTable  # noqa: PLC0415
-    from urdfkin.robot.trajectory import column_units  # noqa: PLC0415
+    from urdfkin.calibration.calibrate import fitted_model, read_poses
+    from urdfkin.dh.parse_table import is_table_file, read_table_or_screws
+    from urdfkin.dh.table import DHTable
+    from urdfkin.robot.trajectory import column_units
 
     options = context.params
     tip, base = options["tip"], options["base"]
@@ -237,7 +237,7 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
 
 
 def _noise(text: str | None) -> tuple[float, float] | None:
-    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415
+    from urdfkin.robot.trajectory import numbers
 
     if text is None:
         return None
@@ -247,8 +247,8 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
     """Apply a factory calibration; print the difference that the two values of --order make."""
-    from urdfkin.calibration.universal_robots import ORDERS, distance, read_calibration, universal_robots  # noqa: PLC0415
-    from urdfkin.comparison.result import angle, length  # noqa: PLC0415
+    from urdfkin.calibration.universal_robots import ORDERS, distance, read_calibration, universal_robots
+    from urdfkin.comparison.result import angle, length
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
     say(
@@ -260,6 +260,6 @@ def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
 
 
 def _as_toml(table: DHTable) -> bytes:
-    from urdfkin.dh.export import export  # noqa: PLC0415
+    from urdfkin.dh.export import export
 
     return export(table, "toml").encode()

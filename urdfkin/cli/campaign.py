@@ -124,7 +124,7 @@ def _json(state: CampaignProgress, pace: Pace) -> None:
 
 @contextmanager
 def _bar(pace: Pace) -> Iterator[Progress]:
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn  # noqa: PLC0415
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     columns = (
         BarColumn(),
@@ -163,7 +163,7 @@ def status(context: click.Context, folder: Path) -> None:
     The command reads only few of the files in DIR, so it is fast and does not disturb a running validation.
     `urdfkin report DIR` reads and checks all files. Exit 0: complete. 3: something is missing or failed.
     """
-    from urdfkin.validation.store import Store  # noqa: PLC0415
+    from urdfkin.validation.store import Store
 
     store = Store.reading(folder, _warn)
     manifest, counts = store.manifest, store.counts()
@@ -199,15 +199,15 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
     if not store.has_judge:
         return
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
-    from urdfkin.report.words import counted  # noqa: PLC0415  --help stays fast
-    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415
+    from urdfkin.report.words import counted
+    from urdfkin.validation.accuracy_store import AccuracyResult
 
     if (results := AccuracyResult.of(store)) is not None:
         say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')} done")
 
 
 def _why(store: Store, robot: int) -> str:
-    from urdfkin.validation.answer import Failure  # noqa: PLC0415
+    from urdfkin.validation.answer import Failure
 
     for index in range(len(store.manifest.cut)):
         found = store.answer(robot, index)
@@ -218,7 +218,7 @@ def _why(store: Store, robot: int) -> str:
 
 def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
     """Return the mean time for a chunk of samples in seconds, from up to `_READ` finished chunks."""
-    from urdfkin.validation.chunk import ChunkResult  # noqa: PLC0415
+    from urdfkin.validation.chunk import ChunkResult
 
     known = [robot for robot, (done, _) in counts.items() if done]
     found = []
@@ -241,8 +241,8 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     Results of the accuracy study are copied too. Each file is read and checked; damaged files are reported
     and skipped. DIR is made if it does not exist.
     """
-    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  --help stays fast
-    from urdfkin.validation.store import Store, opened  # noqa: PLC0415
+    from urdfkin.validation.accuracy_store import AccuracyResult
+    from urdfkin.validation.store import Store, opened
 
     others = [Store.reading(store, _warn) for store in stores]
     with opened(folder, others[0].manifest, _warn) as whole:

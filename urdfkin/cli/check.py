@@ -444,7 +444,7 @@ class CheckRun:
         ):
             self.outcome.unchanged += 1
             return
-        from urdfkin.robot.loading import load  # noqa: PLC0415  --help stays fast
+        from urdfkin.robot.loading import load
 
         how = how_to_load()
         with warnings.catch_warnings():
@@ -527,7 +527,7 @@ def _is_other(file: str) -> bool:
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
             return False  # The next import loads NumPy.
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415  this import is slow, and a URDF does not need it
+    from urdfkin.urdf.mjcf import is_mjcf
 
     return is_mjcf(file)
 

@@ -48,20 +48,20 @@ def complete_frame(context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_table(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    from urdfkin.system.resources import robots_dir  # noqa: PLC0415  only completion needs this module
+    from urdfkin.system.resources import robots_dir
 
     shipped = sorted(path.stem for path in (robots_dir() / "dh").glob("*.toml"))
     return [CompletionItem(incomplete, type="file"), *_offered(shipped, incomplete)]
 
 
 def complete_code(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    from urdfkin.urdf.lint.pages import RULES  # noqa: PLC0415  only completion needs this module
+    from urdfkin.urdf.lint.pages import RULES
 
     return _offered((name for rule in RULES.values() for name in (rule.id, rule.slug)), incomplete)
 
 
 def complete_topic(context: click.Context, parameter: click.Parameter, incomplete: str) -> Items:
-    from urdfkin.kinematics.registry import equations  # noqa: PLC0415  only completion needs this module
+    from urdfkin.kinematics.registry import equations
 
     return [*complete_code(context, parameter, incomplete), *_offered(equations(), incomplete)]
 
@@ -76,9 +76,9 @@ def _offered(names: Iterable[str], incomplete: str) -> Items:
 
 def _frames(word: str) -> Iterator[str]:
     """Yield the frame names in a robot's file, without expanding or computing anything."""
-    from urdfkin.urdf.findings import Reporter  # noqa: PLC0415
-    from urdfkin.urdf.parser import read_document  # noqa: PLC0415
-    from urdfkin.urdf.sources import is_xacro, read_source  # noqa: PLC0415
+    from urdfkin.urdf.findings import Reporter
+    from urdfkin.urdf.parser import read_document
+    from urdfkin.urdf.sources import is_xacro, read_source
 
     if is_xacro(word) or not (word in catalogue() or Path(word).expanduser().is_file()):
         return

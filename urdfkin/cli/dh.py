@@ -202,8 +202,8 @@ def command(robot: str, verify: bool, **options: Any) -> Answer:
     is hidden by the fitted base, tool and joint offsets. 2: bad input. 3: not checked, or the rounding error
     of a strict table is larger than that of the robot.
     """
-    from urdfkin.cli.dh_tables import Work, run  # noqa: PLC0415
-    from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415
+    from urdfkin.cli.dh_tables import Work, run
+    from urdfkin.dh.parse_table import is_table_file
 
     context, is_table = click.get_current_context(), is_table_file(robot)
     options["format_"] = context.params["format_"]

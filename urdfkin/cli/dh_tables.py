@@ -150,7 +150,7 @@ def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:
     if work.format_ == "urdf":
         return to_urdf(table)
     if work.format_ == "svg":
-        from urdfkin.view.dh_drawing import drawing  # noqa: PLC0415  this module needs an extra
+        from urdfkin.view.dh_drawing import drawing
 
         return drawing(table)
     text = export(table, work.format_, work.units, verify=bool(work.robot.verifier.policy))

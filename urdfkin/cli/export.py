@@ -87,8 +87,8 @@ def command(
             context, [p.name or "" for p in context.command.params if p.name != "file"], "with --check"
         )
         context.exit(_check(file))
-    from urdfkin.export import code_in, write  # noqa: PLC0415  --help stays fast
-    from urdfkin.export.forms import code_of_robot  # noqa: PLC0415
+    from urdfkin.export import code_in, write
+    from urdfkin.export.forms import code_of_robot
 
     assert robot is not None
     loaded = load_robot(robot, verify=verify)
@@ -104,7 +104,7 @@ def command(
 
 
 def _check(file: Path) -> int:
-    from urdfkin.export.check import check  # noqa: PLC0415
+    from urdfkin.export.check import check
 
     found = check(file)
     for line in found.lines:

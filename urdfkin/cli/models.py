@@ -105,12 +105,12 @@ def same_command(
     --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are
     compared as written. Exit 0: all frames stay within the given distance. 1: a frame does not.
     """
-    from urdfkin.comparison.bounds import MOST  # noqa: PLC0415  --help stays fast
-    from urdfkin.comparison.certificate import certificate  # noqa: PLC0415
-    from urdfkin.comparison.result import SameQuestion  # noqa: PLC0415
-    from urdfkin.comparison.verdict import parse_map, same  # noqa: PLC0415
-    from urdfkin.model.conventions import as_toml  # noqa: PLC0415
-    from urdfkin.report.same import as_html, command_of, document, markdown_of  # noqa: PLC0415
+    from urdfkin.comparison.bounds import MOST
+    from urdfkin.comparison.certificate import certificate
+    from urdfkin.comparison.result import SameQuestion
+    from urdfkin.comparison.verdict import parse_map, same
+    from urdfkin.model.conventions import as_toml
+    from urdfkin.report.same import as_html, command_of, document, markdown_of
 
     if a is None or b is None:
         raise click.UsageError("name two robots to compare: urdfkin same A B")
@@ -143,9 +143,9 @@ def same_command(
 
 
 def _all_pairs(sources: tuple[str, ...], question: SameQuestion, boxes: int) -> Answer:
-    from urdfkin.comparison.certificate import certificate  # noqa: PLC0415  --help stays fast
-    from urdfkin.comparison.verdict import same  # noqa: PLC0415
-    from urdfkin.report.same import command_of, pairs_document, pairs_markdown  # noqa: PLC0415
+    from urdfkin.comparison.certificate import certificate
+    from urdfkin.comparison.verdict import same
+    from urdfkin.report.same import command_of, pairs_document, pairs_markdown
 
     robots = load_several(*sources)
     with compiling():
@@ -165,7 +165,7 @@ def _all_pairs(sources: tuple[str, ...], question: SameQuestion, boxes: int) -> 
 
 
 def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
-    from urdfkin.comparison.certificate import SAME, recheck, words_of  # noqa: PLC0415  --help stays fast
+    from urdfkin.comparison.certificate import SAME, recheck, words_of
 
     certificate = SAME.read(path)
     errors = recheck(certificate, *robots)
@@ -199,8 +199,8 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """
-    from urdfkin.comparison.diff import diff  # noqa: PLC0415  --help stays fast
-    from urdfkin.report.diff import (  # noqa: PLC0415
+    from urdfkin.comparison.diff import diff
+    from urdfkin.report.diff import (
         HEADS,
         as_data,
         document,

@@ -331,7 +331,7 @@ def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
 
 def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
     """Read a trajectory with joint velocities and accelerations, and write remarks about it to stderr."""
-    from urdfkin.robot.trajectory import read_trajectory  # noqa: PLC0415  --help stays fast
+    from urdfkin.robot.trajectory import read_trajectory
 
     motion = read_trajectory(robot, path, convention=convention)
     tell_notes(motion)
@@ -408,8 +408,8 @@ class Inputs:
 
 def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
     """Load a robot with the options of the command line; `how` overrides them. Warnings go to stderr."""
-    from urdfkin.robot.loading import load  # noqa: PLC0415  --help stays fast
-    from urdfkin.urdf.findings import UrdfWarning  # noqa: PLC0415
+    from urdfkin.robot.loading import load
+    from urdfkin.urdf.findings import UrdfWarning
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -425,7 +425,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
 
     UsageError is raised if two of the robots are `-`, that is, standard input.
     """
-    from urdfkin.urdf.sources import is_usd, is_xacro  # noqa: PLC0415  --help stays fast
+    from urdfkin.urdf.sources import is_usd, is_xacro
 
     if sources.count("-") > 1:
         raise click.UsageError("only one of the robots can come from standard input")
@@ -464,7 +464,7 @@ def read_inputs(
             differ. Or --seed has no effect.
         SourceError: a file that cannot be read.
     """
-    import numpy as np  # noqa: PLC0415  --help stays fast
+    import numpy as np
 
     if not any(text.startswith("random") for text in (q, v, a)):
         reject_unused_options(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
@@ -489,8 +489,8 @@ def _values(
     robot: Robot, letter: str, text: str, where: str, rng: Any, conversion: Conversion | None
 ) -> FloatArray:
     """Return the values of --q, --v or --a as an array with one row for each sample."""
-    from urdfkin.model.configuration import places, sample  # noqa: PLC0415
-    from urdfkin.robot.trajectory import column_units  # noqa: PLC0415
+    from urdfkin.model.configuration import places, sample
+    from urdfkin.robot.trajectory import column_units
 
     known = conversion or robot
     names = known.coordinate_names if letter == "q" else known.rate_names
@@ -524,9 +524,9 @@ def read_batch(
     a unit, for example "elbow [deg]". The second result is the list of column names from `layouts` whose
     length is the number of columns in the file.
     """
-    import numpy as np  # noqa: PLC0415  --help stays fast
+    import numpy as np
 
-    from urdfkin.robot.trajectory import read_columns, width_of  # noqa: PLC0415
+    from urdfkin.robot.trajectory import read_columns, width_of
 
     text = _standard_input() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
     width = width_of(text, str(path)) if len(layouts) > 1 else None
@@ -592,9 +592,9 @@ def with_base(
             length 1. Or the numbers of samples differ.
         SourceError: a file that cannot be read.
     """
-    import numpy as np  # noqa: PLC0415  --help stays fast
+    import numpy as np
 
-    from urdfkin.model.base_motion import BaseMotion  # noqa: PLC0415
+    from urdfkin.model.base_motion import BaseMotion
 
     if placement is None and velocity is None and acceleration is None:
         return x
@@ -617,9 +617,9 @@ def with_base(
 
 def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
     """Return the numbers, one row for each sample, and the list of names from `layouts` that fits them."""
-    import numpy as np  # noqa: PLC0415
+    import numpy as np
 
-    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415
+    from urdfkin.robot.trajectory import numbers
 
     if text.startswith("@"):
         return read_batch(Path(text[1:]), option, layouts)
@@ -629,9 +629,9 @@ def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[Flo
 
 
 def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:
-    import numpy as np  # noqa: PLC0415
+    import numpy as np
 
-    from urdfkin.kinematics.rotation import rotation_from_rpy, rotation_of  # noqa: PLC0415
+    from urdfkin.kinematics.rotation import rotation_from_rpy, rotation_of
 
     T: FloatArray = np.tile(np.eye(4), (len(rows), 1, 1))
     turn = rotation_of if names is _QUATERNION else rotation_from_rpy

@@ -41,7 +41,7 @@ def command(robot: str, start: str | None, end: str | None) -> Answer:
 
 
 def _table(robot: Robot) -> Answer:
-    from urdfkin.model.conventions import BUILT_IN, find_convention  # noqa: PLC0415  --help stays fast
+    from urdfkin.model.conventions import BUILT_IN, find_convention
 
     found = {name: robot.convention(name) for name in BUILT_IN if find_convention(name).order != "given"}
     cells = {name: _cells(robot, conversion) for name, conversion in found.items()}
@@ -97,7 +97,7 @@ def _as_json(conversion: Conversion) -> dict[str, Any]:
 
 
 def _code(start: Conversion, end: Conversion) -> Answer:
-    from urdfkin.model.conventions import reordering  # noqa: PLC0415
+    from urdfkin.model.conventions import reordering
 
     a, b = start.convention.name, end.convention.name
     found = {letter: reordering(letter, start, end) for letter in "qv"}

@@ -75,7 +75,7 @@ class Answer:
     fitted: Callable[[Console], TextDocument] | None = None
 
     def show(self, out: Console) -> None:
-        from urdfkin.report.listing import print_document  # noqa: PLC0415  machine formats need no tables
+        from urdfkin.report.listing import print_document
 
         print_document(out, self.document() if self.fitted is None else self.fitted(out))
         if self.check:
@@ -109,7 +109,7 @@ class Answer:
 
 
 def _npy(array: Any) -> bytes:
-    import numpy as np  # noqa: PLC0415  --help stays fast
+    import numpy as np
 
     stream = io.BytesIO()
     np.save(stream, array)
@@ -158,7 +158,7 @@ def format_option(
 @contextmanager
 def compiling() -> Iterator[None]:
     """Print a line when a kernel is compiled, and then the time; each kernel is compiled only once."""
-    from urdfkin.compiled.kept import listen_to_compile_events  # noqa: PLC0415  --help stays fast
+    from urdfkin.compiled.kept import listen_to_compile_events
 
     hints = [", once; 'urdfkin warm' compiles all kernels"]
 
@@ -178,7 +178,7 @@ def console(*, err: bool = False) -> Console:
 
     If the output goes to a pipe, the variable COLUMNS sets the width. Without COLUMNS, no line is wrapped.
     """
-    from urdfkin.cli.terminal import Terminal  # noqa: PLC0415  --help stays fast
+    from urdfkin.cli.terminal import Terminal
 
     stream = sys.stderr if err else sys.stdout
     return Terminal(stream, width=None if stream.isatty() else _columns())
@@ -240,7 +240,7 @@ def check_of_path(check: object | None) -> tuple[str, int]:
 
     `check` is the result of Pinocchio's check, for example a `TableCheck`; None if nothing was checked.
     """
-    from urdfkin.verify.pinocchio import version  # noqa: PLC0415  --help stays fast
+    from urdfkin.verify.pinocchio import version
 
     by = f"Pinocchio {version()}"
     return (f"NOT VERIFIED by {by}", 3) if check is None else (f"{by}: {check}", 0)

@@ -71,7 +71,7 @@ def chain_command(
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.verify.chain_checks import check_chain  # noqa: PLC0415  --help stays fast
+    from urdfkin.verify.chain_checks import check_chain
 
     loaded = load_robot(robot, verify=verify)
     path = loaded.chain(tip, base)
@@ -161,8 +161,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.dh.export.toolboxes import screws_document, write_screws  # noqa: PLC0415  --help stays fast
-    from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
+    from urdfkin.dh.export.toolboxes import screws_document, write_screws
+    from urdfkin.verify.chain_checks import check_screws
 
     loaded = load_robot(robot, verify=verify)
     screws = loaded.screws(tip, base, verify=False)
@@ -195,9 +195,9 @@ def structure_command(
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.dh.structure import opw_of, structure  # noqa: PLC0415  --help stays fast
-    from urdfkin.system.documents import plain  # noqa: PLC0415
-    from urdfkin.verify.chain_checks import check_opw, check_screws  # noqa: PLC0415
+    from urdfkin.dh.structure import opw_of, structure
+    from urdfkin.system.documents import plain
+    from urdfkin.verify.chain_checks import check_opw, check_screws
 
     if opw is not None:
         reject_unused_options(click.get_current_context(), ("format_",), "with --opw")

@@ -112,9 +112,9 @@ def command(
     """
     if (trajectory is None) == (end is None):
         raise click.UsageError("give either --trajectory FILE.csv, or --to VALUES for a line in joint space")
-    from urdfkin.robot.frame_motion import frame_motion  # noqa: PLC0415
-    from urdfkin.view.figure import save  # noqa: PLC0415  --help stays fast
-    from urdfkin.view.plot import foot, sheet  # noqa: PLC0415
+    from urdfkin.robot.frame_motion import frame_motion
+    from urdfkin.view.figure import save
+    from urdfkin.view.plot import foot, sheet
 
     check_writable(output)
     loaded = load_robot(robot)
@@ -132,8 +132,8 @@ def command(
 def _line(
     robot: Robot, start: str, end: str, duration: float, samples: int, seed: int, convention: str | None
 ) -> Trajectory:
-    from urdfkin.cli.options import read_inputs  # noqa: PLC0415
-    from urdfkin.robot.trajectory import line  # noqa: PLC0415
+    from urdfkin.cli.options import read_inputs
+    from urdfkin.robot.trajectory import line
 
     given = (("--from", start), ("--to", end))
     how = conversion_of(robot, convention)

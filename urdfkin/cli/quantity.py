@@ -100,9 +100,9 @@ def _along(
     robot: Robot, frame: str | None, path: Path, letters: str, conversion: Conversion | None
 ) -> Inputs:
     """Read the samples of a trajectory; compute v and a by differences only if the command needs them."""
-    import numpy as np  # noqa: PLC0415  --help stays fast
+    import numpy as np
 
-    from urdfkin.robot.trajectory import read_samples, with_rates  # noqa: PLC0415
+    from urdfkin.robot.trajectory import read_samples, with_rates
 
     context = click.get_current_context()
     reject_unused_options(context, ("q", "v", "a", "seed"), "along a --trajectory")
@@ -278,7 +278,7 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 
     For a Hessian, the table has one row for each pair of entries of v whose derivatives are not all zero.
     """
-    import numpy as np  # noqa: PLC0415  --help stays fast
+    import numpy as np
 
     if quantity.axes == len(("row", "rate")):
         return Table(("joint", *quantity.labels), list(zip(rates, *value.tolist(), strict=True)), names=(0,))
@@ -296,7 +296,7 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
 
     Pinocchio checks the sum of the contributions, which is the acceleration.
     """
-    from urdfkin.compiled.breakdown import KINDS  # noqa: PLC0415  --help stays fast
+    from urdfkin.compiled.breakdown import KINDS
 
     def parts() -> Iterator[str | Table]:
         yield "m/s^2, rad/s^2; terms (7.125): transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z"
@@ -402,15 +402,15 @@ def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatAr
 
     If Pinocchio has checked the poses, Pinocchio also checks these positions and orientations.
     """
-    import numpy as np  # noqa: PLC0415  --help stays fast
+    import numpy as np
 
-    from urdfkin.kinematics.rotation import quaternion_of, rpy_of  # noqa: PLC0415
+    from urdfkin.kinematics.rotation import quaternion_of, rpy_of
 
     of: Mapping[str, Callable[[Any], FloatArray]]
     of = {"rpy": rpy_of, "quaternion": quaternion_of, "wxyz": quaternion_of}
     orientation = of[written](R := T[:, :3, :3])
     if verify and x.robot.certificate().verified:
-        from urdfkin.verify.orientation import check_orientations  # noqa: PLC0415
+        from urdfkin.verify.orientation import check_orientations
 
         check_orientations(orientation, R, x.frame, lambda k: _again(x, k, written))
     if written == "wxyz":
@@ -461,7 +461,7 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     rates of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity. `urdfkin
     jacobian` prints angular velocities instead.
     """
-    from urdfkin.kinematics.rotation import NEAREST  # noqa: PLC0415  --help stays fast
+    from urdfkin.kinematics.rotation import NEAREST
 
     x, nearest = _read(), NEAREST if nearest is None else nearest
     with compiling():
@@ -507,7 +507,7 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
     explain gravity-in-an-acceleration`.
     """
-    from urdfkin.robot.trajectory import numbers  # noqa: PLC0415  --help stays fast
+    from urdfkin.robot.trajectory import numbers
 
     x = _read()
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
@@ -549,7 +549,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.
     """
-    from urdfkin.system.documents import plain  # noqa: PLC0415  --help stays fast
+    from urdfkin.system.documents import plain
 
     x = _read()
     with compiling():

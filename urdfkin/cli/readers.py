@@ -39,7 +39,7 @@ def command(robot: str, libraries: str | None, samples: int, seed: int) -> Answe
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
     """
-    from urdfkin.comparison.readers import compare_readers  # noqa: PLC0415  --help stays fast
+    from urdfkin.comparison.readers import compare_readers
 
     loaded = load_robot(robot, verify=False)
     names = None if libraries is None else [name.strip() for name in libraries.split(",")]

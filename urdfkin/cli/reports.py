@@ -73,15 +73,15 @@ def _files(document: Document, form: str, path: Path) -> Iterator[tuple[Path, by
     if form == "json_":
         yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
     elif form == "junit":
-        from urdfkin.report.junit import as_junit  # noqa: PLC0415
+        from urdfkin.report.junit import as_junit
 
         yield path, as_junit(document)
     elif form == "markdown":
-        from urdfkin.report.markdown import as_markdown  # noqa: PLC0415
+        from urdfkin.report.markdown import as_markdown
 
         yield path, as_markdown(document).encode()
     else:
-        from urdfkin.report.html import as_files  # noqa: PLC0415  this module draws plots
+        from urdfkin.report.html import as_files
 
         yield from ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
 
@@ -122,8 +122,8 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     The exit code is that of the validation. 0: everything verified. 1: a disagreement. 2: a robot could
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
     """
-    from urdfkin.report.reading import read_document, stored_document  # noqa: PLC0415
-    from urdfkin.validation.document import outcome_of  # noqa: PLC0415  --help stays fast
+    from urdfkin.report.reading import read_document, stored_document
+    from urdfkin.validation.document import outcome_of
 
     if results is None:
         raise click.UsageError("name the file of `urdfkin validate --json FILE`, or the folder of `--store`")
@@ -133,7 +133,7 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     if not failed:
         say_written(files)
     if not any(files.values()):
-        from urdfkin.report.terminal import print_report  # noqa: PLC0415
+        from urdfkin.report.terminal import print_report
 
         print_report(document, console(), cases=cases)
     context.exit(outcome_of(document).exit_code or failed)
@@ -170,8 +170,8 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     numbers of samples, the command exits with 2. Exit 0: no regression. 1: a regression. 2: a file that
     cannot be used.
     """
-    from urdfkin.report.compare import compare, document, markdown_of  # noqa: PLC0415
-    from urdfkin.report.reading import read_document  # noqa: PLC0415
+    from urdfkin.report.compare import compare, document, markdown_of
+    from urdfkin.report.reading import read_document
 
     before, after = read_document(old), read_document(new)
     check_writable(markdown)
@@ -206,7 +206,7 @@ def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
     If a file cannot be used, the command prints its name and the reason, and shows the other files. Exit 0:
     every file was used. 2: a file cannot be used.
     """
-    from urdfkin.report.history import as_html, document, history  # noqa: PLC0415
+    from urdfkin.report.history import as_html, document, history
 
     if not paths:
         raise click.UsageError("give reports, or a folder with reports: urdfkin report history DIR")

@@ -86,7 +86,7 @@ def info_command(robot: str) -> Answer:
 
 def _fitted(out: Console, document: TextDocument) -> TextDocument:
     """If the table is wider than the terminal, show each link and its joint in one column."""
-    from urdfkin.report.listing import fits  # noqa: PLC0415
+    from urdfkin.report.listing import fits
 
     parts = list(document.parts)
     for k, part in enumerate(parts):

@@ -66,9 +66,9 @@ def judge_all(
         retry: Whether to repeat the study of a robot whose study failed in an earlier run.
         how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
     """
-    from urdfkin.validation.accuracy_store import NotJudged  # noqa: PLC0415
-    from urdfkin.validation.campaign import shares  # noqa: PLC0415  --help stays fast
-    from urdfkin.validation.chunk import Cut  # noqa: PLC0415
+    from urdfkin.validation.accuracy_store import NotJudged
+    from urdfkin.validation.campaign import shares
+    from urdfkin.validation.chunk import Cut
 
     parts = shares(len(given), Cut(report.samples), shard)
     here = [i for i, part in enumerate(parts) if part]
@@ -101,8 +101,8 @@ def _open_results(
     if folder is None:
         yield None
         return
-    from urdfkin.validation.accuracy_store import AccuracyResult  # noqa: PLC0415  --help stays fast
-    from urdfkin.validation.store import Store, opened  # noqa: PLC0415
+    from urdfkin.validation.accuracy_store import AccuracyResult
+    from urdfkin.validation.store import Store, opened
 
     def tell(message: str) -> None:
         say(f"urdfkin: warning: {message}", err=True)
@@ -117,12 +117,12 @@ def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[Judgement | NotJudged, bool]:
     """Study a robot. Return the accuracy result, and whether to store it (not after a crash)."""
-    import numpy as np  # noqa: PLC0415  --help stays fast
+    import numpy as np
 
-    from urdfkin.model.configuration import draw_base  # noqa: PLC0415
-    from urdfkin.validation.accuracy import judge  # noqa: PLC0415
-    from urdfkin.validation.accuracy_store import NotJudged  # noqa: PLC0415
-    from urdfkin.validation.robot_input import subject  # noqa: PLC0415
+    from urdfkin.model.configuration import draw_base
+    from urdfkin.validation.accuracy import judge
+    from urdfkin.validation.accuracy_store import NotJudged
+    from urdfkin.validation.robot_input import subject
 
     is_same = True
     try:
@@ -250,10 +250,10 @@ def command(
         )
     if shard and any(files.values()):
         raise click.UsageError("a shard has no report; run `urdfkin report merge`, then `urdfkin report`")
-    from urdfkin.report.terminal import print_report  # noqa: PLC0415
-    from urdfkin.urdf.sources import is_xacro  # noqa: PLC0415
-    from urdfkin.validation.accuracy_store import StudySettings  # noqa: PLC0415
-    from urdfkin.validation.campaign import validate  # noqa: PLC0415
+    from urdfkin.report.terminal import print_report
+    from urdfkin.urdf.sources import is_xacro
+    from urdfkin.validation.accuracy_store import StudySettings
+    from urdfkin.validation.campaign import validate
 
     check_writable(*files.values())
     how = how_to_load()
@@ -284,7 +284,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
         yield None
         return
     try:
-        from urdfkin.validation.cluster import connected  # noqa: PLC0415  this module needs an extra
+        from urdfkin.validation.cluster import connected
     except ImportError:
         raise InputError("--scheduler needs dask.distributed", remedy=install_remedy("cluster")) from None
     with connected(scheduler, lambda line: say(f"urdfkin: {line}", err=True)) as cluster:
@@ -293,14 +293,14 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
     """Load standard input now: it can be read only once, and the accuracy study needs it later."""
-    from urdfkin.robot.loading import load  # noqa: PLC0415  --help stays fast
+    from urdfkin.robot.loading import load
 
     return load(source, **how) if source == "-" else source
 
 
 def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
     """Load a USD stage now, with its variants and its articulation; another robot is returned as it is."""
-    from urdfkin.urdf.sources import is_usd  # noqa: PLC0415  --help stays fast
+    from urdfkin.urdf.sources import is_usd
 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}
     if not isinstance(source, str) or not is_usd(source):
@@ -310,7 +310,7 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
     """Print the result of a shard; a full report is possible only after the shards are merged."""
-    from urdfkin.report.words import counted  # noqa: PLC0415  --help stays fast
+    from urdfkin.report.words import counted
 
     for robot in report.robots:
         if robot.reason is not None:

@@ -60,7 +60,7 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
     spatial acceleration. The files contain the placement once, and each other quantity in the frames LOCAL,
     WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and --samples.
     """
-    from urdfkin.validation import vectors  # noqa: PLC0415  --help stays fast
+    from urdfkin.validation import vectors
 
     if folder is None:
         raise click.UsageError("name the folder for the files: urdfkin vectors write DIR")

@@ -110,8 +110,8 @@ def verify_command(
     wrong frame, reference frame, joint order, sign or unit, or a missing term. Exit code 0: all results
     agree; 1: they do not; 3: no oracle can check the robot.
     """
-    from urdfkin.validation.functions import verify_function  # noqa: PLC0415  --help stays fast
-    from urdfkin.validation.programs import Program  # noqa: PLC0415
+    from urdfkin.validation.functions import verify_function
+    from urdfkin.validation.programs import Program
 
     check_writable(junit)
     loaded = load_robot(robot, oracle=oracle)
@@ -148,7 +148,7 @@ def verify_command(
             )
             checks.append(check)
     if junit is not None:
-        from urdfkin.report.junit import functions_as_junit  # noqa: PLC0415
+        from urdfkin.report.junit import functions_as_junit
 
         write_file(junit, functions_as_junit(checks))
     codes = [(3 if check.oracle_share is None else 0) if check.agrees else 1 for check in checks]

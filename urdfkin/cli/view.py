@@ -64,8 +64,8 @@ def command(
     The printed address ends with a secret key. Open the address with its key, and show it only to people who
     may see and move the robot. Other web pages and other users of this machine have no access.
     """
-    from urdfkin.view.server import has_screen, new_server, opened_page  # noqa: PLC0415
-    from urdfkin.view.viewer import Viewer  # noqa: PLC0415
+    from urdfkin.view.server import has_screen, new_server, opened_page
+    from urdfkin.view.viewer import Viewer
 
     loaded = load_robot(robot)
     conversion = conversion_of(loaded, convention)

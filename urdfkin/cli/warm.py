@@ -18,10 +18,10 @@ def command() -> None:
     seconds. Kernels are stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit
     2: the kernels cannot be stored.
     """
-    from urdfkin.compiled.kept import cache_folder, listen_to_compile_events  # noqa: PLC0415
-    from urdfkin.compiled.machine import kernels  # noqa: PLC0415
-    from urdfkin.compiled.machine.single import one_configuration  # noqa: PLC0415
-    from urdfkin.verify.comparison import load_kernels  # noqa: PLC0415
+    from urdfkin.compiled.kept import cache_folder, listen_to_compile_events
+    from urdfkin.compiled.machine import kernels
+    from urdfkin.compiled.machine.single import one_configuration
+    from urdfkin.verify.comparison import load_kernels
 
     folder = cache_folder()
     if folder is None:

@@ -211,7 +211,7 @@ def _source(robot: Robot) -> tuple[str, str]:
 
 def _without_shapes(text: str) -> str:
     """Return a URDF text without shapes, because some libraries search the disk for the files of meshes."""
-    from xml.etree.ElementTree import tostring  # noqa: PLC0415
+    from xml.etree.ElementTree import tostring
 
     robot = plain_xml(text)
     for link in robot.iterfind("link"):

@@ -531,7 +531,7 @@ class Sameness(Displayable):
         >>> found.convention().joints[:2]
         ('shoulder_pan_joint', 'shoulder_lift_joint')
         """
-        from urdfkin.model.conventions import Convention, Conversion, JointRule  # noqa: PLC0415  `same` starts faster without this import
+        from urdfkin.model.conventions import Convention, Conversion, JointRule
 
         tree_a, tree_b = self.trees
         of_b = {one.b: one for one in self.joints}

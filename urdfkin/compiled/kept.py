@@ -77,7 +77,7 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
 def cache_folder() -> Path | None:
     """Return the cache folder of compiled kernels; None if no folder is writable."""
     with importing:
-        from urdfkin.system.cache import kept_folder  # noqa: PLC0415  not needed to interpret
+        from urdfkin.system.cache import kept_folder
 
     numba = sys.modules.get("numba")
     chosen = numba.config.CACHE_DIR if numba else os.environ.get("NUMBA_CACHE_DIR")

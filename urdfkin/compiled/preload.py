@@ -153,9 +153,9 @@ def _compile_beside(name: str, home: str) -> bool:
 
 def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
     """Start a second interpreter that compiles kernels; if it fails, this process compiles them."""
-    import subprocess  # noqa: PLC0415
+    import subprocess
 
-    from urdfkin.system.processes import own_python  # noqa: PLC0415
+    from urdfkin.system.processes import own_python
 
     code = (
         f"{_UNTIL_CLOSED} from urdfkin.compiled import preload; preload._compile({tuple(names)!r}, {home!r})"

@@ -175,7 +175,7 @@ class PreparedFrame:
         if not self.wanted and not preload.single_pays(f"{quantity}s"):
             return None
         with compiling, importing:
-            from urdfkin.compiled.machine.single import arrays_are_known, single  # noqa: PLC0415  loads Numba
+            from urdfkin.compiled.machine.single import arrays_are_known, single
 
         if not arrays_are_known():
             return None

@@ -133,7 +133,7 @@ def code_of(
     code = replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
 
     def exact() -> FrameCode:
-        from urdfkin.export.exact import exact_functions  # noqa: PLC0415  only one language needs this
+        from urdfkin.export.exact import exact_functions
 
         functions, vouched = exact_functions(
             verifier, plan_of, frame, reference, code.functions, proof, verify

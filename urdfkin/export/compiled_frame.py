@@ -318,7 +318,7 @@ class CompiledFrame:
 
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
         with compiling, importing:
-            from urdfkin.compiled.machine.single import arrays_are_known, called  # noqa: PLC0415  slow import
+            from urdfkin.compiled.machine.single import arrays_are_known, called
 
         # The norm of a quaternion or the range of the results must be checked.
         own = self._tree.floating_joints or self._plan.is_large

@@ -434,7 +434,7 @@ def _imports(code: FrameCode, dialect: Dialect) -> str:
 
 
 def _exact(x: Number) -> str:
-    from urdfkin.export.exact import literal  # noqa: PLC0415  only computer algebra needs this module
+    from urdfkin.export.exact import literal
 
     return literal(x)
 

@@ -61,7 +61,7 @@ MOST = 5_000_000
 @cache
 def environment() -> Environment:
     """Return the template environment. It escapes every name and rejects undefined variables."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # noqa: PLC0415  --help stays fast
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("urdfkin.report"),
@@ -86,7 +86,7 @@ def asset(name: str) -> str:
 
 
 def as_is(text: str) -> Markup:
-    from markupsafe import Markup  # noqa: PLC0415
+    from markupsafe import Markup
 
     return Markup(text)
 

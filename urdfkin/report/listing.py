@@ -34,7 +34,7 @@ def print_table(out: Console, table: Table) -> None:
     precision. On a narrow terminal a long name is on its own line, above the other cells of its row. If the
     previous row has the same name, this line is left out.
     """
-    from rich.cells import cell_len  # noqa: PLC0415
+    from rich.cells import cell_len
 
     ascii_only = out.options.ascii_only
     heads, rows, widths = _cells(table)
@@ -71,7 +71,7 @@ def fits(out: Console, table: Table) -> bool:
 
 def _cells(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
     """Return the lines of the table's heading, the table's rows, and the width of each column."""
-    from rich.cells import cell_len  # noqa: PLC0415
+    from rich.cells import cell_len
 
     lines = zip_longest(*(head.split("\n") for head in table.heads), fillvalue="")
     heads, rows = ([[printable(cell) for cell in row] for row in part] for part in (lines, table.cells()))

@@ -327,7 +327,7 @@ def read_document(path: Path) -> Document:
 
 def stored_document(folder: Path) -> Document:
     """Read the document from a store; the checks and errors are those of `read_document`."""
-    from urdfkin.validation.campaign import stored  # noqa: PLC0415  only a store needs this module
+    from urdfkin.validation.campaign import stored
 
     return checked(stored(folder).as_dict(), str(folder))
 

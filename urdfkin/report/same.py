@@ -151,7 +151,7 @@ def where(found: Sameness, frame: Interval) -> str:
 
     The text has the coordinates of A. If a joint moves on its own only in B, the text has its coordinate too.
     """
-    from urdfkin.model.configuration import coordinate_names, units  # noqa: PLC0415
+    from urdfkin.model.configuration import coordinate_names, units
 
     a, b = found.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
@@ -334,8 +334,8 @@ def as_html(
 
     `options` are other options of the command line on the page. `started` is the date and time on the page.
     """
-    from urdfkin.report.html import rendered, when  # noqa: PLC0415  this module loads Jinja
-    from urdfkin.verify.oracles import versions  # noqa: PLC0415
+    from urdfkin.report.html import rendered, when
+    from urdfkin.verify.oracles import versions
 
     moment = started or datetime.now(UTC)
     frames = far_frames(found)

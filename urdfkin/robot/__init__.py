@@ -190,7 +190,7 @@ class Robot(Displayable):
 
     def _sheet(self) -> TextDocument:
         with importing:
-            from urdfkin.system.plain_xml import order_words  # noqa: PLC0415
+            from urdfkin.system.plain_xml import order_words
 
         order = order_words(self.urdf, self.joint_names)
         return described(self.tree, self.base_frame, self.tip_frame, order)
@@ -660,7 +660,7 @@ class Robot(Displayable):
         (12,)
         """
         with importing:
-            from urdfkin.model.conventions import Conversion, find_convention  # noqa: PLC0415
+            from urdfkin.model.conventions import Conversion, find_convention
 
         return Conversion(self.tree, self.urdf, find_convention(name), joints)
 
@@ -677,7 +677,7 @@ class Robot(Displayable):
         [0.0, 0.0, 1.0, 0.0, 0.9, 0.0]
         """
         with importing:
-            from urdfkin.robot.convention_robot import ConventionRobot  # noqa: PLC0415
+            from urdfkin.robot.convention_robot import ConventionRobot
 
         return ConventionRobot(self, self.convention(name, joints))
 
@@ -805,7 +805,7 @@ class Robot(Displayable):
         [0.4, 0.0, 0.0]
         """
         with importing:
-            from urdfkin.kinematics.bodies import seen_from  # noqa: PLC0415  few calls need it
+            from urdfkin.kinematics.bodies import seen_from
 
         name = as_str(relative_to, "relative_to")
         # An error message contains a line that repeats the call, with plain strings.
@@ -1122,7 +1122,7 @@ class Robot(Displayable):
                 near.append((error.distance, part.start + error.sample[0]))
 
         with importing:
-            from urdfkin.compiled.evaluate import in_parts  # noqa: PLC0415  few calls need it
+            from urdfkin.compiled.evaluate import in_parts
 
         in_parts(compute, call.n, threads)
         if near:
@@ -1170,7 +1170,7 @@ class Robot(Displayable):
         sum                    -0.9      0      0      0      0      0
         """
         with importing:
-            from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints  # noqa: PLC0415
+            from urdfkin.compiled.breakdown import KINDS, AccelerationBreakdown, moving_joints
 
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
@@ -1231,7 +1231,7 @@ class Robot(Displayable):
         True
         """
         with importing:
-            from urdfkin.verify.exact.enclosure import enclose  # noqa: PLC0415  it loads python-flint
+            from urdfkin.verify.exact.enclosure import enclose
 
         frame = self._default_frame() if frame is None else frame
         inputs, hessian = (q, v, a), as_bool(hessian, "hessian")
@@ -1288,7 +1288,7 @@ class Robot(Displayable):
         [0.9, 0.0, 0.0]
         """
         with importing:
-            from urdfkin.export.compiled_frame import CompiledFrame  # noqa: PLC0415  few calls need it
+            from urdfkin.export.compiled_frame import CompiledFrame
 
         frame = self._default_frame() if frame is None else frame
         self.tree.frame_link(frame)
@@ -1375,7 +1375,7 @@ class Robot(Displayable):
         True
         """
         with importing:
-            from urdfkin.export.python import need_torch, torch_module  # noqa: PLC0415  few calls need it
+            from urdfkin.export.python import need_torch, torch_module
 
         need_torch()
         return torch_module(self.export("torch", frame, quantities, reference, verify=verify))
@@ -1481,8 +1481,8 @@ class Robot(Displayable):
             0.10915
         """
         with importing:
-            from urdfkin.dh.make import dh_table  # noqa: PLC0415
-            from urdfkin.dh.table import DHTable  # noqa: PLC0415
+            from urdfkin.dh.make import dh_table
+            from urdfkin.dh.table import DHTable
 
         if not isinstance(like, DHTable | None):
             raise InputError(
@@ -1528,8 +1528,8 @@ class Robot(Displayable):
             [0.0, 0.0, 1.0, 0.0, -0.5, 0.0]
         """
         with importing:
-            from urdfkin.dh.screws import screws_of  # noqa: PLC0415
-            from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
+            from urdfkin.dh.screws import screws_of
+            from urdfkin.verify.chain_checks import check_screws
 
         found = screws_of(self.chain(tip, base))
         if self.verifier.wanted(verify):
@@ -1551,7 +1551,7 @@ class Robot(Displayable):
         [('joint_1', 0.0), ('joint_2', 0.5), ('end', 0.4)]
         """
         with importing:
-            from urdfkin.dh.tree_parameters import tree_parameters  # noqa: PLC0415
+            from urdfkin.dh.tree_parameters import tree_parameters
 
         parameters = tree_parameters(self.tree)
         if self.verifier.wanted(verify):

@@ -129,12 +129,12 @@ def load(  # noqa: PLR0911  each kind of source has a branch
         raise InputError("`variant` and `articulation` need the path of a USD file", found=safe_repr(source))
     if is_urdf_path(source) or (isinstance(source, str) and entry_of(source)):
         return robot_of(read_source(source, xacro_args=xacro_args), **how)
-    from urdfkin.dh.parse_table import is_table_file  # noqa: PLC0415  a URDF does not need it
-    from urdfkin.dh.screws import ProductOfExponentials  # noqa: PLC0415
-    from urdfkin.dh.table import DHTable  # noqa: PLC0415
-    from urdfkin.urdf.catalogue import described  # noqa: PLC0415
-    from urdfkin.urdf.foreign import is_model, lost_quaternions, text_of  # noqa: PLC0415
-    from urdfkin.urdf.mjcf import is_mjcf  # noqa: PLC0415
+    from urdfkin.dh.parse_table import is_table_file
+    from urdfkin.dh.screws import ProductOfExponentials
+    from urdfkin.dh.table import DHTable
+    from urdfkin.urdf.catalogue import described
+    from urdfkin.urdf.foreign import is_model, lost_quaternions, text_of
+    from urdfkin.urdf.mjcf import is_mjcf
 
     if (found := described(source)) is not None:
         source = found.path
@@ -164,13 +164,13 @@ def _load_table(
     xacro_args: Mapping[str, object] | None,
     **how: Unpack[LoadOptions],
 ) -> Robot:
-    from urdfkin.dh.compare.slips import doubts  # noqa: PLC0415
-    from urdfkin.dh.convert import to_urdf  # noqa: PLC0415
-    from urdfkin.dh.parse_table import read_table_or_screws  # noqa: PLC0415
-    from urdfkin.dh.screws import ProductOfExponentials  # noqa: PLC0415
-    from urdfkin.dh.table import DHTable  # noqa: PLC0415
-    from urdfkin.verify.chain_checks import check_screws  # noqa: PLC0415
-    from urdfkin.verify.model_check import check_table_source  # noqa: PLC0415
+    from urdfkin.dh.compare.slips import doubts
+    from urdfkin.dh.convert import to_urdf
+    from urdfkin.dh.parse_table import read_table_or_screws
+    from urdfkin.dh.screws import ProductOfExponentials
+    from urdfkin.dh.table import DHTable
+    from urdfkin.verify.chain_checks import check_screws
+    from urdfkin.verify.model_check import check_table_source
 
     _refuse_arguments(xacro_args, "a table")
     table: DHTable | ProductOfExponentials
@@ -202,10 +202,10 @@ def _load_mjcf(
     streamed: Text | None,
     **how: Unpack[LoadOptions],
 ) -> Robot:
-    import hashlib  # noqa: PLC0415
+    import hashlib
 
-    from urdfkin.urdf.mjcf import name_of  # noqa: PLC0415
-    from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf  # noqa: PLC0415
+    from urdfkin.urdf.mjcf import name_of
+    from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
 
     _refuse_arguments(xacro_args, "MJCF")
     wanted = bool(checked_choice(how["verify"]))
@@ -229,10 +229,10 @@ def _load_usd(
     articulation: str | None,
     **how: Unpack[LoadOptions],
 ) -> Robot:
-    import hashlib  # noqa: PLC0415
+    import hashlib
 
-    from urdfkin.urdf.lint.rules.left_out import of_usd  # noqa: PLC0415
-    from urdfkin.verify.usd_check import check_usd_source, read_usd, single_precision  # noqa: PLC0415
+    from urdfkin.urdf.lint.rules.left_out import of_usd
+    from urdfkin.verify.usd_check import check_usd_source, read_usd, single_precision
 
     _refuse_arguments(xacro_args, "USD")
     variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
@@ -271,7 +271,7 @@ def _plain(robot: Robot, text: Text, **options: Any) -> Robot:
 
 def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
     """Return the bytes of an MJCF source, from which its SHA-256 digest is computed."""
-    from urdfkin.urdf.mjcf import is_text  # noqa: PLC0415
+    from urdfkin.urdf.mjcf import is_text
 
     if isinstance(source, bytes):
         return source
@@ -281,8 +281,8 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
 
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[LoadOptions]) -> Robot:
-    from urdfkin.urdf.foreign import tree_of_model  # noqa: PLC0415
-    from urdfkin.verify.model_check import check_model_source  # noqa: PLC0415
+    from urdfkin.urdf.foreign import tree_of_model
+    from urdfkin.verify.model_check import check_model_source
 
     _refuse_arguments(xacro_args, "a pinocchio.Model")
     read = tree_of_model(source)

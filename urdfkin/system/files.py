@@ -241,7 +241,7 @@ def write_file(path: Path, data: bytes) -> None:
         if path.exists() and not os.access(path, os.W_OK):  # a rename would ignore this permission
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
-        import tempfile  # noqa: PLC0415  loading a robot does not need this module
+        import tempfile
 
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as stream:
             name = stream.name

@@ -47,7 +47,9 @@ def installed_version(package: str) -> str | None:
         for name in os.listdir(entry):  # noqa: PTH208  the function of pathlib is slower
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    from importlib import metadata  # noqa: PLC0415  a file in the current folder could replace its modules
+    from importlib import (
+        metadata,
+    )  # A file in the current folder could replace modules that `metadata` imports.
 
     try:
         return metadata.version(package)

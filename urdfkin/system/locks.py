@@ -64,7 +64,7 @@ class _ImportLock:
             return
         with self._lock:
             if not self._registered:
-                import logging  # noqa: F401, PLC0415  a file in the current folder could replace `logging`
+                import logging  # noqa: F401  a file in the current folder could replace `logging`
 
                 os.register_at_fork(
                     before=_before_fork, after_in_parent=_after_fork, after_in_child=_after_fork

@@ -49,7 +49,7 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
     The process is killed after `patience` seconds, and after more than `most` bytes of output. The result is
     the output, with at most `most` + 1 bytes, and the exit status; the status is None after a timeout.
     """
-    import subprocess  # noqa: PLC0415  loading a robot does not need this module
+    import subprocess
 
     environ = _ENVIRONMENT | {name: os.environ[name] for name in _NEEDED if name in os.environ}
     pipe = subprocess.PIPE
@@ -112,7 +112,7 @@ def with_stack(size: int, function: Callable[[], _T]) -> _T:
     >>> with_stack(64 * 2**20, lambda: 6 * 7)
     42
     """
-    from concurrent.futures import Future  # noqa: PLC0415  most callers do not need this module
+    from concurrent.futures import Future
 
     future: Future[_T] = Future()
 

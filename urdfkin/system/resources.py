@@ -46,7 +46,7 @@ def example_robots_dir() -> Path:
 
 def _example_candidates() -> Iterator[Path]:
     below = Path("share", "example-robot-data", "robots")
-    from importlib import metadata  # noqa: PLC0415  this import takes as long as loading a robot
+    from importlib import metadata
 
     try:
         distribution = metadata.distribution("example-robot-data")

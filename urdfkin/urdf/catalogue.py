@@ -101,7 +101,7 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
     path = robots_dir() / file
     if not path.is_file():
         return {}
-    import tomllib  # noqa: PLC0415  a robot from a file does not need this module
+    import tomllib
 
     with path.open("rb") as stream:
         table = tomllib.load(stream)
@@ -222,7 +222,7 @@ def _module(name: str) -> ModuleType:
         raise InputError(
             f"{_PACKAGE} is not installed", where=name, remedy=f"pip install {_PACKAGE}, or name a file"
         )
-    from robot_descriptions import DESCRIPTIONS  # noqa: PLC0415  most robots do not need this module
+    from robot_descriptions import DESCRIPTIONS
 
     if name not in DESCRIPTIONS:
         raise UnknownNameError("robot description", name, DESCRIPTIONS)

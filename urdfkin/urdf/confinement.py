@@ -91,7 +91,7 @@ def _exists(path: Path) -> bool:
 
 def limit(seconds: int) -> None:
     """Limit the memory and time of this process; forbid it to write files and start processes."""
-    import resource  # noqa: PLC0415  some systems do not have this module
+    import resource
 
     bounds = {
         resource.RLIMIT_AS: MEMORY,

@@ -53,7 +53,7 @@ def _expand(
 
     The names are None without arguments from the user, or if an include cannot be read.
     """
-    import xacrodoc  # noqa: PLC0415  only the confined process needs this module
+    import xacrodoc
 
     _replace_evaluation(path, search, ground)
     importlib.import_module("xml.dom.expatbuilder")  # minidom would import this module later
@@ -69,9 +69,9 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
 
     Raise RefusedError if the replacement has no effect.
     """
-    import xacro  # noqa: PLC0415  only the confined process needs this module
-    import xacrodoc.packages  # noqa: PLC0415  only the confined process needs this module
-    from xacro import substitution_args  # noqa: PLC0415  only the confined process needs this module
+    import xacro
+    import xacrodoc.packages
+    from xacro import substitution_args
 
     symbols = xacro._global_symbols
     for name in _NEVER:

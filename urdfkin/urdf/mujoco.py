@@ -12,7 +12,7 @@ from urdfkin.system.lazy_import import install_remedy, installed_version
 def library() -> Any:
     """Return the module `mujoco`; raise InputError if MuJoCo is not installed."""
     try:
-        import mujoco  # noqa: PLC0415  the import of this optional package is slow
+        import mujoco
     except ImportError:
         raise InputError("MuJoCo is not installed", remedy=install_remedy("mujoco")) from None
     return mujoco

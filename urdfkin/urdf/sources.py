@@ -218,7 +218,7 @@ def _suffix(source: object) -> str:
 
 
 def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
-    from urdfkin.urdf.xacro import expand  # noqa: PLC0415  only .xacro files need this module
+    from urdfkin.urdf.xacro import expand
 
     words = {name: str(value) for name, value in arguments.items()}
     return Text(expand(path, words), f"{path} (expanded)", as_word(path), xacro_args=tuple(words.items()))

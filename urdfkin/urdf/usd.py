@@ -178,7 +178,7 @@ def version() -> str:
 def library() -> Any:
     """Return the modules of OpenUSD as attributes of one object; raise InputError without OpenUSD."""
     try:
-        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics  # noqa: PLC0415  this import is slow
+        from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
     except ImportError:
         raise InputError("OpenUSD is not installed", remedy=install_remedy("usd")) from None
     return SimpleNamespace(Ar=Ar, Gf=Gf, Sdf=Sdf, Tf=Tf, Usd=Usd, UsdGeom=UsdGeom, UsdPhysics=UsdPhysics)

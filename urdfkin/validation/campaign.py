@@ -223,7 +223,7 @@ def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Jud
     """Return the accuracy results of the compared robots, and whether no result is missing."""
     if not store.has_judge:
         return (), True
-    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged  # noqa: PLC0415  python-flint may be missing
+    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged
 
     if (results := AccuracyResult.of(store)) is None:
         return (), True

@@ -292,7 +292,7 @@ class Mistakes:
         mimics = [joint for joint in tree.joints if joint.mimic]
         if not mimics or self.conversion is not None:
             return
-        from urdfkin.robot.loading import load  # noqa: PLC0415  few robots need this import
+        from urdfkin.robot.loading import load
 
         lock = dict(self.robot.origin.lock)
         free = load(self.robot.urdf, mimic=False, root_joint=self.robot.root_joint, lock=lock, verify=False)
@@ -386,7 +386,7 @@ class Mistakes:
         """Yield the joint orders of other tools, if they are permutations of urdfkin's order."""
         if self.conversion is not None:
             return
-        from urdfkin.model.conventions import BUILT_IN  # noqa: PLC0415  few functions need this import
+        from urdfkin.model.conventions import BUILT_IN
 
         seen = {tuple(range(self.robot.nq))}
         for name in BUILT_IN:

@@ -108,7 +108,7 @@ def _relative(poses: Poses, root: str) -> Poses:
 
 def read_pinocchio(text: str) -> Reading:
     """Read a URDF with Pinocchio; `mimic=True` couples its mimic joints."""
-    import pinocchio as pin  # noqa: PLC0415
+    import pinocchio as pin
 
     if _is_path(text):
         model, root = pin.buildModelFromMJCF(text), "universe"
@@ -141,7 +141,7 @@ def read_pinocchio(text: str) -> Reading:
 
 def read_mujoco(text: str) -> Reading:
     """Read a URDF with MuJoCo; links at fixed joints are not merged, and each mass has a lower limit."""
-    import mujoco  # noqa: PLC0415
+    import mujoco
 
     root = "world"
     if not _is_path(text):
@@ -190,8 +190,8 @@ def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, V
 
 def read_drake(text: str) -> Reading:
     """Read a URDF with Drake, as a discrete plant with the contact solver that mimic joints require."""
-    from pydrake.multibody.parsing import Parser  # noqa: PLC0415
-    from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant  # noqa: PLC0415
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 
     root, plant = _root(text), MultibodyPlant(0.001)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
@@ -223,7 +223,7 @@ def _name(text: str) -> str:
 
 
 def read_idyntree(text: str) -> Reading:
-    import idyntree.bindings as idt  # noqa: PLC0415
+    import idyntree.bindings as idt
 
     root, loader, computed = _root(text), idt.ModelLoader(), idt.KinDynComputations()
     if not loader.loadModelFromString(text) or not computed.loadRobotModel(loader.model()):
@@ -251,7 +251,7 @@ def read_idyntree(text: str) -> Reading:
 
 
 def read_yourdfpy(text: str) -> Reading:
-    import yourdfpy  # noqa: PLC0415
+    import yourdfpy
 
     logging.getLogger("yourdfpy.urdf").disabled = True
     model = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=True)
@@ -265,7 +265,7 @@ def read_yourdfpy(text: str) -> Reading:
 
 
 def read_urchin(text: str) -> Reading:
-    import urchin  # noqa: PLC0415
+    import urchin
 
     with _file(text) as path:
         model = urchin.URDF.load(path, lazy_load_meshes=True)
@@ -296,7 +296,7 @@ def _rotation(quaternion: Value) -> Value:
 
 
 def read_kinpy(text: str) -> Reading:
-    import kinpy  # noqa: PLC0415
+    import kinpy
 
     chain = kinpy.build_chain_from_urdf(text.encode())
     names = list(chain.get_joint_parameter_names())
@@ -310,7 +310,7 @@ def read_kinpy(text: str) -> Reading:
 
 def read_ikpy(text: str) -> Reading:
     """Read a URDF with ikpy, which reads only one path from the root to a tip."""
-    from ikpy.chain import Chain  # noqa: PLC0415
+    from ikpy.chain import Chain
 
     root, children = _root(text), _children(text)
     with _file(text) as path, warnings.catch_warnings():
@@ -328,7 +328,7 @@ def read_ikpy(text: str) -> Reading:
 
 
 def read_roboticstoolbox(text: str) -> Reading:
-    import roboticstoolbox as rtb  # noqa: PLC0415
+    import roboticstoolbox as rtb
 
     joints = {child: joint for joint, child in _children(text).items()}
     with _file(text) as path:
@@ -345,7 +345,7 @@ def read_roboticstoolbox(text: str) -> Reading:
 
 
 def read_skrobot(text: str) -> Reading:
-    from skrobot.models.urdf import RobotModelFromURDF  # noqa: PLC0415
+    from skrobot.models.urdf import RobotModelFromURDF
 
     with _file(text) as path:
         robot = RobotModelFromURDF(urdf_file=path)
@@ -361,7 +361,7 @@ def read_skrobot(text: str) -> Reading:
 
 def read_newton(path: str) -> Reading:
     """Read a USD stage with Newton, which computes in single precision."""
-    import newton  # noqa: PLC0415
+    import newton
 
     builder = newton.ModelBuilder()
     builder.add_usd(path)

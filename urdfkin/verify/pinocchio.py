@@ -54,7 +54,7 @@ def pinocchio() -> Any:
             of the same name.
     """
     try:
-        import pinocchio as found  # noqa: PLC0415  Pinocchio takes long to import, and only checks need it
+        import pinocchio as found
     except ImportError as error:
         if error.name == "pinocchio":
             raise InstallationError("Pinocchio is not installed", remedy=f"pip install {_WANTED}") from None
@@ -99,7 +99,7 @@ def _impostor(found: Any) -> InstallationError:
 
 def _owner(file: Path) -> tuple[str, str] | None:
     """Return the name and the version of the installed project that contains a file."""
-    from importlib import metadata  # noqa: PLC0415  only an error needs this import
+    from importlib import metadata
 
     for project in metadata.distributions():
         for one in project.files or ():

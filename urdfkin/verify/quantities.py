@@ -128,7 +128,7 @@ class Quantity:
     @property
     def references(self) -> tuple[Reference | None, ...]:
         """Reference frames in which the validation and the accuracy study compare the quantity."""
-        from urdfkin.model.reference import Reference  # noqa: PLC0415
+        from urdfkin.model.reference import Reference
 
         return tuple(Reference) if self.referred else (None,)
 

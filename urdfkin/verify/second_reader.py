@@ -111,7 +111,7 @@ def second_reading(
 
 def read(text: str) -> yourdf.Robot:
     """Return yourdfpy's robot of a URDF text without meshes; yourdfpy may raise any exception."""
-    import yourdfpy  # noqa: PLC0415  yourdfpy imports trimesh
+    import yourdfpy  # yourdfpy imports trimesh, which is slow
 
     # The text is now UTF-8, even if the file declares another encoding.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)

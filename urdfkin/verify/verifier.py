@@ -196,7 +196,7 @@ class Verifier:
     @property
     def sha256(self) -> str:
         """SHA-256 of the MJCF file, or of the URDF text as UTF-8."""
-        import hashlib  # noqa: PLC0415  hashlib loads OpenSSL
+        import hashlib  # hashlib loads OpenSSL, which is slow
 
         return self.origin.sha256 or hashlib.sha256(self.text.encode()).hexdigest()
 
@@ -326,7 +326,7 @@ class Verifier:
         Raises:
             TableError: urdfkin and Pinocchio differ by more than the bound.
         """
-        from urdfkin.verify.tables import TableError, check_table  # noqa: PLC0415
+        from urdfkin.verify.tables import TableError, check_table
 
         if (reason := self.cannot()) is not None:
             _warn(reason)
@@ -353,7 +353,7 @@ class Verifier:
         Raises:
             TableError: urdfkin and Pinocchio differ by more than the bound.
         """
-        from urdfkin.verify.tables import TableError  # noqa: PLC0415
+        from urdfkin.verify.tables import TableError
 
         if (reason := self.cannot()) is not None:
             _warn(reason)

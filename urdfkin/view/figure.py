@@ -63,7 +63,7 @@ def new_figure(width: float, height: float) -> Figure:
     Raise InputError if matplotlib is not installed.
     """
     _matplotlib()
-    from matplotlib.figure import Figure  # noqa: PLC0415  other commands do not need this module
+    from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 

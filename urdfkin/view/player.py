@@ -169,7 +169,7 @@ def as_png(frame: np.ndarray) -> bytes:
 
 
 def _on_white(frame: np.ndarray) -> Any:
-    from PIL import Image  # noqa: PLC0415  only a saved picture needs this module
+    from PIL import Image
 
     image = Image.fromarray(frame).convert("RGBA")
     return Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")

@@ -31,7 +31,7 @@ LARGEST_FILE = 200_000_000
 
 @lru_cache(maxsize=256)
 def _read(file: Path) -> Any:
-    import trimesh  # noqa: PLC0415  the import takes half a second
+    import trimesh
 
     class SameFolder(trimesh.resolvers.FilePathResolver):
         """Find materials and textures: only regular files in the mesh's folder or below it."""
@@ -50,7 +50,7 @@ def _read(file: Path) -> Any:
 
 def mesh(shape: Shape) -> Any | None:
     """Return a coloured trimesh.Trimesh in the link's axes; None if the file is unreadable."""
-    import trimesh  # noqa: PLC0415  the import takes half a second
+    import trimesh
 
     if shape.file is None:
         return None

@@ -195,7 +195,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
     UnguardedError if this version of viser cannot be secured.
     """
     try:
-        import viser  # noqa: PLC0415  only the viewer needs this optional package
+        import viser
     except ImportError:
         raise InputError("the viewer needs viser", remedy=install_remedy("view")) from None
 
@@ -242,8 +242,8 @@ def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[
 
     The callback returns a response, or None to accept a WebSocket connection.
     """
-    from websockets.datastructures import Headers  # noqa: PLC0415  only the viewer needs this module
-    from websockets.http11 import Response  # noqa: PLC0415  only the viewer needs this module
+    from websockets.datastructures import Headers
+    from websockets.http11 import Response
 
     def response(status: http.HTTPStatus, kind: str, body: bytes, **more: str) -> Response:
         length = {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(body))}
@@ -266,7 +266,7 @@ def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[
 
 def _page() -> Callable[[str], bytes]:
     """Return a function that creates viser's page for a nonce, which is a random key of the page."""
-    import viser  # noqa: PLC0415  only the viewer needs this optional package
+    import viser
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
     try:
@@ -292,7 +292,7 @@ def _page() -> Callable[[str], bytes]:
 @contextlib.contextmanager
 def _responding_with(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
     """While the context is open, new servers call `answer` for each request, and log no refused request."""
-    from websockets.asyncio import server as module  # noqa: PLC0415  only the viewer needs this module
+    from websockets.asyncio import server as module
 
     plain: Any = module.serve
     logger = logging.Logger("urdfkin.view")

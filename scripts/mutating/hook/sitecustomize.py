@@ -22,7 +22,7 @@ TEXTS = os.environ.get("URDFKIN_MUTANT_TEXTS", "")
 
 class _Loader(importlib.machinery.SourceFileLoader):
     def get_code(self, fullname: str) -> CodeType:
-        from scripts.mutating.operators import mutated, rewritten  # noqa: PLC0415  most processes need no mutant
+        from scripts.mutating.operators import mutated, rewritten
 
         source = Path(self.path).read_text(encoding="utf-8")
         tree = mutated(source, int(NUMBER)) if NUMBER else rewritten(source, *json.loads(TEXTS))

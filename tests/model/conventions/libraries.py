@@ -127,9 +127,9 @@ def mujoco(robot: Robot, folder: Path) -> Library:
 
 def drake(robot: Robot, folder: Path) -> Library:
     pytest.importorskip("pydrake")
-    from pydrake.multibody.parsing import Parser  # noqa: PLC0415
-    from pydrake.multibody.plant import MultibodyPlant  # noqa: PLC0415
-    from pydrake.multibody.tree import JacobianWrtVariable  # noqa: PLC0415
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.multibody.tree import JacobianWrtVariable
 
     plant = MultibodyPlant(0.0)
     Parser(plant).AddModelsFromString(bare(robot.urdf), "urdf")
@@ -186,7 +186,7 @@ def idyntree(robot: Robot, folder: Path) -> Library:
 
 def rtb(robot: Robot, folder: Path) -> Library:
     pytest.importorskip("roboticstoolbox")
-    from roboticstoolbox import Robot as Toolbox  # noqa: PLC0415
+    from roboticstoolbox import Robot as Toolbox
 
     file = folder / "robot.urdf"
     file.write_text(bare(robot.urdf))
@@ -223,7 +223,7 @@ def newton_usd(robot: Robot, folder: Path) -> Library:
 
 
 def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) -> Library:
-    import newton as sim  # noqa: PLC0415
+    import newton as sim
 
     model = builder.finalize(device="cpu")
     free = robot.root_joint is not None
@@ -257,7 +257,7 @@ def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) 
 def _stage(robot: Robot, folder: Path) -> Any:
     """Return the stage that urdf-usd-converter writes, without its joint to the world for a free base."""
     converter = pytest.importorskip("urdf_usd_converter")
-    from pxr import Usd  # noqa: PLC0415
+    from pxr import Usd
 
     file = folder / "robot.urdf"
     file.write_text(bare(robot.urdf))
@@ -286,7 +286,7 @@ def usd(robot: Robot, folder: Path) -> Library:
     OpenUSD has no forward kinematics. It is computed here from the frames and axes of the joint prims.
     """
     stage = _stage(robot, folder)
-    from pxr import Gf, UsdPhysics  # noqa: PLC0415
+    from pxr import Gf, UsdPhysics
 
     def matrix(rotation: Any, place: Any = (0, 0, 0)) -> FloatArray:
         T = Gf.Matrix4d(Gf.Rotation(Gf.Quatd(rotation)), Gf.Vec3d(*map(float, place)))
@@ -341,7 +341,7 @@ def usd(robot: Robot, folder: Path) -> Library:
 
 
 def pinocchio(robot: Robot, folder: Path) -> Library:
-    import pinocchio as pin  # noqa: PLC0415
+    import pinocchio as pin
 
     model: Any = robot.pinocchio_model()
     data = model.createData()

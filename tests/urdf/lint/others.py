@@ -37,10 +37,10 @@ def _in_a_fork(question: Callable[[bytes], object], document: bytes) -> str:
 
 
 def _main() -> None:
-    import io  # noqa: PLC0415
+    import io
 
-    import pinocchio as pin  # noqa: PLC0415
-    from yourdfpy import URDF  # noqa: PLC0415
+    import pinocchio as pin
+    from yourdfpy import URDF
 
     questions: dict[str, Callable[[bytes], object]] = {
         "pinocchio": lambda x: pin.buildModelFromXML(x.decode("utf-8", "surrogateescape")),

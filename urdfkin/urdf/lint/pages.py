@@ -72,7 +72,7 @@ def page(code: str) -> Page:
 
 
 def page_files() -> dict[str, Traversable]:
-    from importlib import resources  # noqa: PLC0415  few runs need this module
+    from importlib import resources
 
     packages = {module.__name__.rpartition(".")[2]: module.__package__ for module in (*_MODULES, left_out)}
     return {topic: resources.files(str(package)) / f"{topic}.toml" for topic, package in packages.items()}
@@ -80,7 +80,7 @@ def page_files() -> dict[str, Traversable]:
 
 @cache
 def topic_pages(topic: str) -> dict[str, Page]:
-    import tomllib  # noqa: PLC0415  few runs need this module
+    import tomllib
 
     data = tomllib.loads(page_files()[topic].read_text(encoding="utf-8"))
     defaults = {key: value for key, value in data.items() if isinstance(value, str)}

@@ -482,8 +482,8 @@ class _MimicChecker:
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
         """Check that the limits of a mimic joint allow the full range of the mimicked joint."""
-        from urdfkin.model.configuration import kept_range, range_words  # noqa: PLC0415  few files need NumPy
-        from urdfkin.model.tree import Limit  # noqa: PLC0415  few files need NumPy
+        from urdfkin.model.configuration import kept_range, range_words
+        from urdfkin.model.tree import Limit
 
         rule, leader = self.resolved(mimic)
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
@@ -512,7 +512,7 @@ class _MimicChecker:
 
         The joint is None if the chain of mimic rules is a circle, or names a joint that does not exist.
         """
-        from urdfkin.model.tree import Mimic  # noqa: PLC0415  few files need NumPy
+        from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
         leader = self.joints.get(rule.leader)
