@@ -47,9 +47,8 @@ def installed_version(package: str) -> str | None:
         for name in os.listdir(entry):  # noqa: PTH208  the function of pathlib is slower
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    from importlib import (
-        metadata,
-    )  # A file in the current folder could replace modules that `metadata` imports.
+    # A file in the current folder could replace modules that `metadata` imports.
+    from importlib import metadata
 
     try:
         return metadata.version(package)
