@@ -459,7 +459,7 @@ class Sameness(Displayable):
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
-        >>> found.holds(Question(within=1.0))
+        >>> found.holds(SameQuestion(within=1.0))
         True
         """
         if not (bool(self) if question.within is None else self.within(question.within)):

@@ -57,7 +57,7 @@ class QuestionsSection(Enum):
 
     If you print a question, you see the command that prints its section:
 
-    >>> print(Question.MIMIC_JOINTS)
+    >>> print(QuestionsSection.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`
     """
 

@@ -39,7 +39,7 @@ class ElementaryMotion:
 class Path:
     """A product of constant poses (4, 4) and elementary motions, first to last.
 
-    >>> arm = Path((Motion(2, turns=True), elementary(0, False, 2.0)))
+    >>> arm = Path((ElementaryMotion(2, turns=True), elementary(0, False, 2.0)))
     >>> arm.poses([np.pi / 2])[:3, 3].round(12).tolist()
     [0.0, 2.0, 0.0]
     >>> arm.columns([0.0])[1].ravel().tolist()

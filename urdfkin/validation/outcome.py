@@ -69,7 +69,7 @@ def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> RunOutcom
     """Return the outcome of a run with `asked` requested robots.
 
     >>> outcome(["verified", "disagrees"], asked=3, interrupted=False)
-    Outcome(exit_code=1, reason='1 of 3 robots disagrees, 1 of 3 robots without a report')
+    RunOutcome(exit_code=1, reason='1 of 3 robots disagrees, 1 of 3 robots without a report')
     >>> outcome(["bad input", "bad input"], asked=3, interrupted=False).reason
     '2 of 3 robots have bad input, 1 of 3 robots without a report'
     """
