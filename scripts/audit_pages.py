@@ -54,10 +54,10 @@ _AXE_SECONDS = 600
 #: Violations of other severities are printed only.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Numbers of presses of the Tab key on a page, and of printed pages to draw.
+#: Maximum number of presses of the Tab key on a page, and of printed pages that are drawn.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: Chromium reports a mouse, because the site's theme hides some elements without one.
+#: The site's theme hides some elements if Chromium reports no mouse.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )

@@ -3,12 +3,12 @@
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 
 Each round times every library once. Ratios are therefore reliable even on a machine with other load, but
-absolute times are not. The script prints medians, minima and ratios of medians. The script compares the
-results first. The script fails if results differ. It does not fail if something is slow. Libraries that are
-not installed are listed and left out.
+absolute times are not. The script prints medians, minima and ratios of medians. It first compares the results
+of all libraries, and fails if they differ. A slow library is no failure. A library that is not installed is
+listed, but not measured.
 
-`--only where` splits the time of a batch and of a single call into parts. `--only first` measures the first
-use of each quantity.
+`--only where` measures the time of each step of a batch and of a single call. `--only first` measures the
+first call of each quantity, in a new process.
 """
 
 import argparse

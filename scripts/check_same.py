@@ -32,7 +32,7 @@ from urdfkin.comparison.result import Sameness, Verdict
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
-#: Largest rounding error of a placement in a robot of some metres (m, and entries of a rotation).
+#: Maximum rounding error of a placement in a robot of a few metres (m, and entries of a rotation matrix).
 ROUNDING = 1e-10
 
 
@@ -47,7 +47,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     said = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
         return said | {"right": bool(found) and _places_agree(found, a, b)}
-    # Rounding to four digits may leave a file unchanged, so the verdict of this change is not checked.
+    # Rounding to four digits may not change a file, so both verdicts are correct.
     said["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
     # The frame with the largest distance, without frames that moved on their bodies
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]

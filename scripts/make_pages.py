@@ -123,7 +123,7 @@ def reports() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # An entry without a description has that of its type.
+            # An entry without a description has the description of its type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append((f"`{name}`", _type(entry), _cell(entry.get("description") or kind["description"])))
         heads = ("entry", "type", "meaning")
@@ -229,12 +229,12 @@ def _of_robots() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # A step is the distance of two doubles at the largest absolute value of all ends.
+            # A step is the distance of neighbouring doubles at the largest end of an interval.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
             )
-            # Numbers with an interval of width 0 do not count.
+            # Exact results have intervals of width 0 and do not count.
             inside = [
                 np.concatenate([p.contains(getattr(p, side))[p.width > 0.0] for p in parts]).mean()
                 for side in ("urdfkin", "pinocchio")

@@ -38,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # pytest's exit code if no test was collected
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: Numba compiles the source of these files, so a mutant made on import has no effect.
+#: Numba compiles the source text of these files, so a changed syntax tree has no effect.
 #: tests/laws/test_mutation.py mutates them without the compiler.
 COMPILED = {
     "compiled/machine/kernels.py", "compiled/machine/memory.py", "compiled/machine/numbers.py",
@@ -109,7 +109,7 @@ def named_slips() -> list[Named]:
 
 @cache
 def argued() -> dict[tuple[str, str], str]:
-    """Return the reason of each harmless mutant, by its function and its text."""
+    """Return the reason why each mutant is harmless, by the mutant's function and text."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)
@@ -168,13 +168,13 @@ def judge_named(slip: Named, *, timeout: float) -> Outcome:
     texts = json.dumps([slip.before, slip.after])
     word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):
-        word = "not run"  # the test failed for another reason than the mutant
+        word = "not run"  # the test failed, but not because of the mutant
     file = slip.file.relative_to(ROOT).as_posix()
     mutant = Mutant(slip.claim, file, 0, f"{slip.before}  ->  {slip.after}", slip.module)
     return Outcome(mutant, word, by)
 
 
-#: This server imports the foreign libraries once, which takes longer than most tests.
+#: The fork server imports the foreign libraries once, because this takes longer than most tests.
 _READY = multiprocessing.get_context("forkserver")
 _READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 

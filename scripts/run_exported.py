@@ -19,7 +19,7 @@ from typing import Any
 
 
 def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
-    """Yield the largest error of each check as a share of its bound; 0 or inf for a check without one."""
+    """Yield each check's largest error as a share of its bound; 0 or inf for a check without numbers."""
     scope = runpy.run_path(path)
     if library == "jax":
         import jax
@@ -61,7 +61,7 @@ def of_compiled(scope: dict[str, Any]) -> float:
 
     found = 0.0
     for name, letters in scope["INPUTS"].items():
-        if name == "hessian":  # its many numbers take minutes to compile
+        if name == "hessian":  # the compilation takes minutes
             continue
         compiled = torch.compile(scope[name], fullgraph=True)
         inputs = [scope["GIVEN"][letter] for letter in letters]

@@ -1,4 +1,4 @@
-"""Count the additions and multiplications of one configuration, by numbers that count their operations.
+"""Count the additions and multiplications for one configuration, with numbers that record their operations.
 
 A fused multiply-add counts as two operations, as in the stated peak performance of a machine. A change of
 sign and a product with a known 0 or 1 do not count.
@@ -16,8 +16,8 @@ from urdfkin.compiled import axes, outputs, recursion
 from urdfkin.compiled.plan import KEPT_ROWS, WIDTH, CompiledTree, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
-#: Operations of a sine and a cosine (`compiled.python_numbers`): 10 reduce the angle.
-#: z, 1 - z/2 and their rounding errors need 8, the two polynomials 20, and the last steps 13.
+#: Number of operations of a sine and a cosine (`compiled.python_numbers`).
+#: Reduction of the angle: 10. The terms z and 1 - z/2 with their errors: 8. Polynomials: 20. Last steps: 13.
 _SINE_COSINE = 51
 
 
@@ -59,7 +59,7 @@ class Number:
 
 
 def count(results: Any) -> int:
-    """Count the operations that compute these results; shared ones count once."""
+    """Return the number of operations that compute these results; a shared operation counts once."""
     waiting, seen = [results], set[Number]()
     while waiting:
         value = waiting.pop()
@@ -74,7 +74,7 @@ def count(results: Any) -> int:
 
 @dataclass
 class _Walk:
-    """Run the forward recursion and the functions of `outputs` with numbers that count their operations."""
+    """The functions of the forward recursion, bound to numbers that record their operations."""
 
     written: list[Any] = field(default_factory=list)
 

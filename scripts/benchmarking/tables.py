@@ -90,7 +90,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
             yield _contest(section, title, rows)
     if batch := sections.get("batch"):
         yield Words("summary", "urdfkin against the others, medians", [_best(*one) for one in _groups(batch)])
-        title = "lower limits of the time for one configuration, from its bytes and its operations"
+        title = "lower limits of the time for one configuration, by memory and by arithmetic"
         yield Words("floor", title, [_floor(*one, figures["operations"]) for one in _groups(batch)])
     for kind, what in (("batch", "a batch, one thread"), ("single", "a single call")):
         if chosen := [entry for entry in figures.get("where", ()) if entry["kind"] == kind]:
