@@ -4,8 +4,8 @@
 
 PYTHON is the interpreter of an environment with the tool (default: this interpreter). A tool that reads MJCF
 gets the MJCF file that MuJoCo makes of the URDF. For a tool that reads USD, `TOOLS` names the tool that
-writes the USD file; give both tools. Install each tool in its own environment, because usd-core and usd-
-exchange contain modules with equal names:
+writes the USD file; give both tools. Install each tool in its own environment, because usd-core and
+usd-exchange contain modules with equal names:
 
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
     python scripts/survey_converters.py urdf-usd-converter=CONVERTER/bin/python
