@@ -47,7 +47,12 @@ ROWS = (
     Row("`urdfkin jacobian MY.urdf --q random`, empty kernel cache", _JACOBIAN, 2.5, fresh=True),
     Row("`urdfkin same panda panda`", ("-c", _COMMAND, "same", "panda", "panda"), 2.5),
     Row("`import urdfkin`, `load`, `jacobian` in Python", ("-c", _NOTEBOOK, "ROBOT"), 2.0),
-    Row("`import urdfkin`, `load`, `jacobian` in Python, empty kernel cache", ("-c", _NOTEBOOK, "ROBOT"), 2.5, fresh=True),
+    Row(
+        "`import urdfkin`, `load`, `jacobian` in Python, empty kernel cache",
+        ("-c", _NOTEBOOK, "ROBOT"),
+        2.5,
+        fresh=True,
+    ),
 )
 
 

@@ -347,7 +347,9 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
     columns = positions(subject.robot.joint_names, chain.get_joint_parameter_names())
     n = min(subject.n, _MOST)
     q = torch.from_numpy(np.ascontiguousarray(subject.q[:n, columns]))
-    remark = "computes only the columns of the path's joints; reads angles with seven digits; uses all processors"
+    remark = (
+        "computes only the columns of the path's joints; reads angles with seven digits; uses all processors"
+    )
 
     def work(who: str, jacobian: Callable[[Any], Any]) -> Work:
         def result() -> FloatArray:

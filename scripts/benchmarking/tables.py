@@ -180,7 +180,9 @@ def _best(title: str, group: list[Entry]) -> dict[str, str]:
         "": title,
         "1 thread, ns": number(one),
         "speed, Pinocchio's loop = 1": number(who[ONE]["ratio"]),
-        "speed with all threads, Pinocchio's loop = 1": number(several["ratio"]) if several else "one processor",
+        "speed with all threads, Pinocchio's loop = 1": number(several["ratio"])
+        if several
+        else "one processor",
         "speed compiled for this robot, 1 thread, Pinocchio's loop = 1": compiled,
         _SHARE: number(ceiling / one) if ceiling else "not measured",
         "fastest other library, ns": f"{best['who']}, {number(best['median_ns'])}",
