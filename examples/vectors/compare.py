@@ -1,4 +1,4 @@
-"""Compare your results with test vectors. This module needs no library.
+"""Compare your results with test vectors; no library is needed.
 
 from compare import wrong
 
