@@ -39,7 +39,7 @@ class Contender:
     library: str  # name of the distribution
     module: str  # name of the module
     calls: Callable[[Subject, str], Iterator[Calls]] | None = None
-    #: Function that returns the library's own batch computations; None if `calls` run in a loop.
+    #: Returns the library's computations of a batch; None: the calls run in a loop.
     batches: Callable[[Subject, str], Iterator[Work]] | None = None
     program: str | None = None  # another program that the library needs
 
@@ -72,7 +72,7 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the tasks for a batch: threads, a new or reused output, and only the writing of the output."""
+    """Yield the timed tasks for a batch, with different threads and memory; one only writes the output."""
     method, n = getattr(subject.robot, quantity), subject.n
     inputs = subject.inputs(quantity, n)
     out, own, floor = np.empty((3, n, *subject.width(quantity)))
@@ -91,7 +91,7 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
-    """Yield the calls of the robot's method and of prepared evaluators; `verify` applies to all calls."""
+    """Yield the calls of the robot's method and of prepared frames, all of them checked or none."""
     robot, frame = subject.robot, subject.frame
     names = {"robot": robot, "frame": frame, "out": np.empty(subject.width(quantity))}
     names["prepared"] = robot.prepare(frame, verify=verify)
@@ -138,7 +138,7 @@ _here: dict[str, Any] = {}
 
 
 def pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield a loop in this process, and a batch that several processes compute in shared memory."""
+    """Yield a loop, and a batch by several running processes with shared memory."""
     yield pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
     spawn: Any = multiprocessing.get_context("spawn")
     buffers, arrays = [], []
@@ -169,7 +169,7 @@ def _share(start: int, stop: int) -> None:
     _here["loop"](out, *inputs)
 
 
-# Some libraries order rows or coordinates differently. The conversion is not included in the measured time.
+# Inputs and results in another order of rows or coordinates are reordered outside the measured time.
 
 #: Row order that converts [angular; linear] to [linear; angular].
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
@@ -313,7 +313,7 @@ def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
     order = positions(subject.robot.joint_names, [link._joint_name for link in moving])
     columns = [int(i) for i in path.jindices]
     names = {"path": path, "tensordot": np.tensordot, "columns": np.array(columns)}
-    who, remark = "Robotics Toolbox, loop", "computes the path's columns alone"
+    who, remark = "Robotics Toolbox, loop", "computes only the columns of the path's joints"
     if quantity == "jacobian":
         ours, shape = [order[i] for i in columns], (6, len(columns))
 
@@ -347,7 +347,9 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
     columns = positions(subject.robot.joint_names, chain.get_joint_parameter_names())
     n = min(subject.n, _MOST)
     q = torch.from_numpy(np.ascontiguousarray(subject.q[:n, columns]))
-    remark = "only the columns of the path; reads angles in single precision; uses all processors"
+    remark = (
+        "computes only the columns of the path's joints; reads angles with seven digits; uses all processors"
+    )
 
     def work(who: str, jacobian: Callable[[Any], Any]) -> Work:
         def result() -> FloatArray:
@@ -391,7 +393,7 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
         subject.n,
         lambda: compiled(*inputs).block_until_ready(),
         lambda: np.asarray(compiled(*inputs)),
-        remark="all processors; arrays are JAX's own",
+        remark="uses all processors and JAX's own arrays",
     )
 
 

@@ -27,7 +27,9 @@ from urdfkin.model.tree import FloatArray
 
 GENERATED = "generated for this robot, 1 thread"
 COMPILER = "cc"
-_REMARK = "C written by CasADi for one robot, one frame, one quantity; it does not look at its inputs"
+_REMARK = (
+    "C code that CasADi writes for one robot, one frame and one quantity; the code does not check its inputs"
+)
 _FRAME = Path(__file__).with_suffix(".c")
 _FLAGS = ("-std=gnu11", "-O3", "-march=native", "-shared", "-fPIC")
 
