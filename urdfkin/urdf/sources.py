@@ -209,9 +209,10 @@ def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 def _suffix(source: object) -> str:
     """Return the suffix of a path in lower case; an empty string for text and any other source."""
+    if not isinstance(source, str | os.PathLike):
+        return ""
     is_text = isinstance(source, str) and source.lstrip().startswith("<")
-    is_path = isinstance(source, str | os.PathLike) and not is_text
-    return Path(source).suffix.lower() if is_path else ""
+    return "" if is_text else Path(source).suffix.lower()
 
 
 def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:

@@ -957,7 +957,7 @@ class _StageReader:
         return len(set(below)) > 1
 
     def _short(self, path: str) -> str:
-        """Return the name of a prim, preceded by the names of ancestors if other bodies have the same name."""
+        """Return a prim's name, preceded by the names of ancestors if other bodies have the same name."""
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:

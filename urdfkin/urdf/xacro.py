@@ -115,10 +115,9 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError("the expanded URDF is too long", where=str(path), found=f"more than {MOST} bytes")
     answer = _answer(output)
     if "urdf" in answer:
-        declared = answer.get("arguments")
-        unknown = next((name for name in arguments if declared is not None and name not in declared), None)
-        if unknown is not None:
-            raise UnknownNameError("xacro argument", unknown, declared, where=str(path))
+        declared = list(arguments) if answer.get("arguments") is None else answer["arguments"]
+        if unknown := [name for name in arguments if name not in declared]:
+            raise UnknownNameError("xacro argument", unknown[0], declared, where=str(path))
         return str(answer["urdf"]).encode()
     reason = answer.get("error") or f"the process of xacro ended with status {status}"
     raise XacroError(
