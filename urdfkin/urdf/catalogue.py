@@ -242,8 +242,5 @@ def _file(module: Any) -> Described:
         if hasattr(module, name):
             arguments = getattr(module, "XACRO_ARGS", {}) if name == "XACRO_PATH" else {}
             return Described(Path(getattr(module, name)), dict(arguments))
-    raise InputError(
-        "this module has neither URDF_PATH nor XACRO_PATH nor MJCF_PATH",
-        where=module.__name__,
-        remedy=f"pass a description module of {_PACKAGE}",
-    )
+    message = "this module has neither URDF_PATH nor XACRO_PATH nor MJCF_PATH"
+    raise InputError(message, where=module.__name__, remedy=f"pass a description module of {_PACKAGE}")

@@ -284,12 +284,9 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         reader = _MjcfReader(mujoco, model, spec.modelname or "robot", name)
         tree = reader.tree()
     except UnicodeDecodeError as error:
-        raise InputError(
-            "this MJCF contains a name that is not UTF-8",
-            where=name,
-            found=repr(error.object)[:80],
-            remedy="save the file as UTF-8",
-        ) from None
+        message = "this MJCF contains a name that is not UTF-8"
+        remedy = "save the file as UTF-8"
+        raise InputError(message, where=name, found=repr(error.object)[:80], remedy=remedy) from None
     except InputError:
         raise
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
@@ -487,11 +484,9 @@ class _MjcfReader:
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
         if kind == kinds.mjJNT_BALL:
-            raise InputError(
-                "urdfkin does not support ball joints",
-                where=f"{self.source}: joint {name}",
-                remedy="use three hinges in one body (singular where the middle one is at a right angle)",
-            )
+            message = "urdfkin does not support ball joints"
+            remedy = "use three hinges in one body (singular where the middle one is at a right angle)"
+            raise InputError(message, where=f"{self.source}: joint {name}", remedy=remedy)
         at = int(m.jnt_qposadr[j])
         if kind == kinds.mjJNT_FREE:
             place = ", ".join(f"{x:g}" for x in m.qpos0[at : at + 3])

@@ -99,24 +99,18 @@ def _declared_encoding(text: bytes) -> str | None:
 def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     zero = text.find(b"\0")
     if zero >= 0:
-        report.add(
-            ENCODING,
-            "the text contains a zero byte: some readers stop there, others continue",
-            remedy="check the file: it is not a text file, or it is damaged",
-            position=line_and_column(text, zero),
-        )
+        message = "the text contains a zero byte: some readers stop there, others continue"
+        remedy = "check the file: it is not a text file, or it is damaged"
+        report.add(ENCODING, message, remedy=remedy, position=line_and_column(text, zero))
         return False
     try:
         text.decode("utf-8")
     except UnicodeDecodeError as error:
         claim = f", although the file declares {declared}" if declared else ""
-        report.add(
-            ENCODING,
-            f"a byte is not UTF-8{claim}",
-            found=f"0x{text[error.start]:02x}",
-            remedy="save the file as UTF-8",
-            position=line_and_column(text, error.start),
-        )
+        message = f"a byte is not UTF-8{claim}"
+        remedy = "save the file as UTF-8"
+        found = f"0x{text[error.start]:02x}"
+        report.add(ENCODING, message, found=found, remedy=remedy, position=line_and_column(text, error.start))
         return False
     return True
 
@@ -139,12 +133,8 @@ def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
             fix=lambda: Fix((Edit(*match.span(1), "UTF-8"),)) if (match := _ENCODING.search(text)) else None,
         )
         return True
-    report.add(
-        DECLARED,
-        "the declared encoding is not UTF-8",
-        found=quoted(declared),
-        remedy='save the file as UTF-8 and write encoding="UTF-8"',
-    )
+    remedy = 'save the file as UTF-8 and write encoding="UTF-8"'
+    report.add(DECLARED, "the declared encoding is not UTF-8", found=quoted(declared), remedy=remedy)
     return False
 
 
@@ -198,12 +188,9 @@ def read_document(report: Reporter) -> Element | None:
     """Parse the reporter's file and return its root element. If this fails, add a finding and return None."""
     data, most = report.data, report.limits.bytes
     if len(data) > most:
-        report.add(
-            TOO_LARGE,
-            "the file is too large",
-            found=f"{len(data)} bytes, more than {most}",
-            remedy="if the file is correct, raise the limit with --max-bytes",
-        )
+        message = "the file is too large"
+        remedy = "if the file is correct, raise the limit with --max-bytes"
+        report.add(TOO_LARGE, message, found=f"{len(data)} bytes, more than {most}", remedy=remedy)
         return None
     text = utf8_bytes(report, data)
     if text is None:
@@ -363,13 +350,9 @@ class _Builder:
             return
         what = "contains definitions" if has_subset else "refers to an external definition"
         found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
-        self.report.add(
-            ENTITY,
-            f"the document type declaration {what}",
-            found=found,
-            remedy="remove the declaration and write the values directly; nothing was expanded or opened",
-            position=position,
-        )
+        message = f"the document type declaration {what}"
+        remedy = "remove the declaration and write the values directly; nothing was expanded or opened"
+        self.report.add(ENTITY, message, found=found, remedy=remedy, position=position)
         raise _StopError
 
     def skipped(self, name: str, is_parameter: int) -> None:
@@ -377,13 +360,10 @@ class _Builder:
         raise _StopError
 
     def undefined_entity(self, name: str | None) -> None:
-        self.report.add(
-            ENTITY,
-            "the file uses an entity that XML does not define",
-            found=quoted(f"&{name};") if name else None,
-            remedy="write the character itself, or one of &lt; &gt; &amp; &quot; &apos;",
-            position=self.position(),
-        )
+        message = "the file uses an entity that XML does not define"
+        remedy = "write the character itself, or one of &lt; &gt; &amp; &quot; &apos;"
+        found = quoted(f"&{name};") if name else None
+        self.report.add(ENTITY, message, found=found, remedy=remedy, position=self.position())
 
     def syntax_error(self, error: expat.ExpatError) -> None:
         reason = expat.errors.messages[error.code]
@@ -715,24 +695,15 @@ def named(report: Reporter, element: Element) -> str:
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
-        report.add(
-            MISSING_NAME,
-            f"a {element.tag} {what}",
-            element,
-            attribute="name",
-            remedy=f'write <{element.tag} name="...">',
-        )
+        remedy = f'write <{element.tag} name="...">'
+        report.add(MISSING_NAME, f"a {element.tag} {what}", element, attribute="name", remedy=remedy)
     return name or ""
 
 
 def report_duplicate(report: Reporter, element: Element, first: Element) -> None:
-    report.add(
-        DUPLICATE_NAME,
-        f"another {element.tag} has this name",
-        element,
-        attribute="name",
-        remedy=f"the first is on line {first.line}; rename one {element.tag}",
-    )
+    message = f"another {element.tag} has this name"
+    remedy = f"the first is on line {first.line}; rename one {element.tag}"
+    report.add(DUPLICATE_NAME, message, element, attribute="name", remedy=remedy)
 
 
 class JointReader:
@@ -774,14 +745,10 @@ class JointReader:
         if written is None or written in JOINT_TYPES:
             return written
         close = nearest_tag(written, frozenset(JOINT_TYPES))
-        self.report.add(
-            UNKNOWN_TYPE,
-            "unknown joint type",
-            element,
-            attribute="type",
-            found=quoted(written),
-            remedy=f"did you mean {close}?" if close else f"the types are {', '.join(JOINT_TYPES)}",
-        )
+        message = "unknown joint type"
+        remedy = f"did you mean {close}?" if close else f"the types are {', '.join(JOINT_TYPES)}"
+        found = quoted(written)
+        self.report.add(UNKNOWN_TYPE, message, element, attribute="type", found=found, remedy=remedy)
         return None
 
     def _end(self, element: Element, tag: str) -> str | None:

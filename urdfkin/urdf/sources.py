@@ -224,11 +224,8 @@ def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
 
 def _read_string(word: str, most: int) -> Text:
     if not word.strip():
-        raise InputError(
-            "the robot's name is empty",
-            found=repr(word),
-            remedy="a path, a name that 'urdfkin robots' lists, or '-'",
-        )
+        remedy = "a path, a name that 'urdfkin robots' lists, or '-'"
+        raise InputError("the robot's name is empty", found=repr(word), remedy=remedy)
     if word == "-":
         return Text(read_start_of_standard_input(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):

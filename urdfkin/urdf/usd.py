@@ -519,12 +519,9 @@ class _StageReader:
             scale = -scale
         R = M[:3, :3] / scale
         if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR * SINGLE * prim.GetPath().pathElementCount:
-            raise InputError(
-                "the frame of a prim has shear, so it is no frame of a rigid body",
-                where=where,
-                found=self._uneven_scale(prim),
-                remedy="apply the scale to the shapes, not to a parent of a rotated body",
-            )
+            message = "the frame of a prim has shear, so it is no frame of a rigid body"
+            remedy = "apply the scale to the shapes, not to a parent of a rotated body"
+            raise InputError(message, where=where, found=self._uneven_scale(prim), remedy=remedy)
         U, _, V = np.linalg.svd(R)
         return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._unit), scale
 
@@ -641,11 +638,9 @@ class _StageReader:
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
         size = float(np.linalg.norm(xyzw))
         if not (np.isfinite(p).all() and math.isfinite(size) and size > 0.0):
-            raise InputError(
-                f"localPos{i} or localRot{i} of a joint is not finite, or the quaternion is zero",
-                where=f"{self.source}: joint {prim.GetPath()}",
-                found=f"{p.tolist()}, {quaternion}",
-            )
+            message = f"localPos{i} or localRot{i} of a joint is not finite, or the quaternion is zero"
+            found = f"{p.tolist()}, {quaternion}"
+            raise InputError(message, where=f"{self.source}: joint {prim.GetPath()}", found=found)
         off = float(np.linalg.norm(_rounding(p))) * self._unit, _turned(xyzw)
         R, p = rotation_of(xyzw / size), p * self._unit
         if target is None:
@@ -704,18 +699,12 @@ class _StageReader:
                 ends = (float(self._value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
                 return self._bounded(path, f"{'rot' if turns else 'trans'}{letter}", ends)
         if prim.IsA(physics.SphericalJoint):
-            raise InputError(
-                "urdfkin does not support spherical joints",
-                where=path,
-                remedy="use three revolute joints (singular where the middle one is at a right angle)",
-            )
+            remedy = "use three revolute joints (singular where the middle one is at a right angle)"
+            raise InputError("urdfkin does not support spherical joints", where=path, remedy=remedy)
         if prim.GetTypeName() != "PhysicsJoint":
-            raise InputError(
-                "urdfkin does not support this kind of joint",
-                where=path,
-                found=str(prim.GetTypeName()),
-                remedy="exclude it from the articulation, or use another joint",
-            )
+            message = "urdfkin does not support this kind of joint"
+            remedy = "exclude it from the articulation, or use another joint"
+            raise InputError(message, where=path, found=str(prim.GetTypeName()), remedy=remedy)
         return self._general_motion(prim, path)
 
     def _general_motion(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
@@ -737,12 +726,9 @@ class _StageReader:
             return self._bounded(path, free[0], iter(limits[free[0]]))
         kind = {("transX", "transY", "rotZ"): JointKind.PLANAR, _DIRECTIONS: JointKind.FLOATING}.get(free)
         if kind is None:
-            raise InputError(
-                "urdfkin does not support a joint with these degrees of freedom",
-                where=path,
-                found=", ".join(free),
-                remedy="leave one degree of freedom free, or write several joints with a body between them",
-            )
+            message = "urdfkin does not support a joint with these degrees of freedom"
+            remedy = "leave one degree of freedom free, or write several joints with a body between them"
+            raise InputError(message, where=path, found=", ".join(free), remedy=remedy)
         if any(math.isfinite(end) for ends in limits.values() for end in ends):
             self._report("unused-in-usd", path, "the limits of this planar or floating joint are not read")
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
@@ -768,11 +754,8 @@ class _StageReader:
     ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         lower, upper = (math.copysign(math.inf, end) if abs(end) >= _LARGEST else end for end in ends)
         if not lower <= upper:
-            raise InputError(
-                "the lower limit of a joint is above its upper limit",
-                where=path,
-                found=f"{lower:g} and {upper:g}",
-            )
+            message = "the lower limit of a joint is above its upper limit"
+            raise InputError(message, where=path, found=f"{lower:g} and {upper:g}")
         kind, factor = JointKind.PRISMATIC, self._unit
         if free.startswith("rot"):
             bounded = math.isfinite(lower) and math.isfinite(upper)
@@ -845,21 +828,15 @@ class _StageReader:
     def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
         """Return the articulation with a path or name, or all articulations below another prim."""
         if not found:
-            raise InputError(
-                "this stage has no joint between bodies",
-                where=self.source,
-                found=f"{len(self._bodies)} bodies",
-                remedy="apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints",
-            )
+            message = "this stage has no joint between bodies"
+            remedy = "apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints"
+            raise InputError(message, where=self.source, found=f"{len(self._bodies)} bodies", remedy=remedy)
         paths = [group.path for group in found]
         if wanted is None:
             if len(found) > 1:
-                raise InputError(
-                    f"this stage has {len(found)} articulations",
-                    where=self.source,
-                    found=", ".join(paths[:8]),
-                    remedy="choose one with --articulation PATH, or all below the PATH of another prim",
-                )
+                message = f"this stage has {len(found)} articulations"
+                remedy = "choose one with --articulation PATH, or all below the PATH of another prim"
+                raise InputError(message, where=self.source, found=", ".join(paths[:8]), remedy=remedy)
             return found[0]
         if not wanted:
             raise UnknownNameError("articulation", wanted, paths, where=self.source)

@@ -73,12 +73,10 @@ def _joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
 def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
     bounded = joint.kind.bounded
     if bounded and (limit is None or math.isinf(limit.lower) or math.isinf(limit.upper)):
-        raise InputError(
-            "a URDF needs finite position limits for a revolute or prismatic joint",
-            where=f"joint {joint.name}",
-            found="none" if limit is None else f"{limit.lower} to {limit.upper}",
-            remedy="give the joint limits, or make it continuous if it rotates without limits",
-        )
+        message = "a URDF needs finite position limits for a revolute or prismatic joint"
+        remedy = "give the joint limits, or make it continuous if it rotates without limits"
+        found = "none" if limit is None else f"{limit.lower} to {limit.upper}"
+        raise InputError(message, where=f"joint {joint.name}", found=found, remedy=remedy)
     if limit is None:
         return
     named = [("effort", limit.effort), ("velocity", limit.velocity)]

@@ -101,12 +101,9 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
     if not path.is_file():
         raise SourceError("no such file", where=str(path))
     if find_spec("xacrodoc") is None:
-        raise XacroError(
-            "a .xacro file needs the package xacrodoc",
-            where=str(path),
-            remedy=f"{install_remedy('xacro')}, or expand the file with: xacro FILE > robot.urdf",
-            question=QuestionsSection.XACRO,
-        )
+        message = "a .xacro file needs the package xacrodoc"
+        remedy = f"{install_remedy('xacro')}, or expand the file with: xacro FILE > robot.urdf"
+        raise XacroError(message, where=str(path), remedy=remedy, question=QuestionsSection.XACRO)
     command = own_python("from urdfkin.urdf.expanding import serve; serve()", options=("-B", "-X", "utf8"))
     output, status = ask_python(command, _request(path.absolute(), arguments, patience), patience, MOST)
     if status is None:

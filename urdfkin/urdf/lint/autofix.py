@@ -196,8 +196,8 @@ def _unified_diff(name: str, before: bytes, after: bytes) -> str:
     end = "\t" if " " in name else ""  # git needs a tab after a file name that contains spaces
     old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
     # Like git, StringIO ends a line only at a line feed.
-    lines = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))
-    found = difflib.unified_diff(*lines, old, new)
+    a, b = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))
+    found = difflib.unified_diff(a, b, old, new)
     return "".join(line if line.endswith("\n") else f"{line}\n{_NO_END}" for line in found)
 
 

@@ -47,13 +47,9 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
     if tensor is not None:
         missing += [name for name in _MOMENTS if name not in tensor.attributes]
     if missing:
-        report.add(
-            INERTIAL_INCOMPLETE,
-            "<inertial> is incomplete",
-            inertial,
-            found=f"no {', '.join(missing)}",
-            remedy="write <mass> and all six moments of <inertia>, or remove <inertial>",
-        )
+        message = "<inertial> is incomplete"
+        remedy = "write <mass> and all six moments of <inertia>, or remove <inertial>"
+        report.add(INERTIAL_INCOMPLETE, message, inertial, found=f"no {', '.join(missing)}", remedy=remedy)
     lever = None
     if origin is not None:
         lever = numbers.vector(origin, "xyz")
@@ -83,24 +79,17 @@ def _check_mass(
     heavy = mass is not None and abs(mass) > HEAVIEST
     distance = max(map(abs, lever or (0.0,)))
     if heavy or distance > FARTHEST:
-        report.add(
-            INERTIAL_SCALE,
-            "the mass or the centre of mass is far too large",
-            inertial,
-            found=f"mass {mass:g} kg" if heavy else f"centre of mass {distance:g} m away",
-            remedy="write the mass in kilograms and the centre of mass in metres",
-        )
+        message = "the mass or the centre of mass is far too large"
+        remedy = "write the mass in kilograms and the centre of mass in metres"
+        found = f"mass {mass:g} kg" if heavy else f"centre of mass {distance:g} m away"
+        report.add(INERTIAL_SCALE, message, inertial, found=found, remedy=remedy)
 
 
 def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass: float | None) -> None:
     kilograms = 1.0 if mass is None else abs(mass)
     if mass == 0.0 and any(moments):
-        report.add(
-            INERTIAL_IMPOSSIBLE,
-            "the body has moments of inertia, but no mass",
-            tensor,
-            remedy="write the mass in kilograms, or remove the moments",
-        )
+        remedy = "write the mass in kilograms, or remove the moments"
+        report.add(INERTIAL_IMPOSSIBLE, "the body has moments of inertia, but no mass", tensor, remedy=remedy)
         return
     if 0.0 < kilograms < NEGLIGIBLE:
         return
@@ -113,13 +102,8 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
         found = f"{small:.3g}, {middle:.3g} and {large:.3g}"
     else:
         return
-    report.add(
-        INERTIAL_IMPOSSIBLE,
-        f"no body has this inertia: {what}",
-        tensor,
-        found=found,
-        remedy="check the units and signs of the moments; kinematics does not use them",
-    )
+    remedy = "check the units and signs of the moments; kinematics does not use them"
+    report.add(INERTIAL_IMPOSSIBLE, f"no body has this inertia: {what}", tensor, found=found, remedy=remedy)
 
 
 def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
@@ -226,14 +210,9 @@ def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
     for material in robot.element.all("material"):
         name = material.attributes.get("name", "")
         if name in defined:
-            report.add(
-                MATERIAL_TWICE,
-                "another material of the robot has this name; urdfdom refuses the file",
-                material,
-                attribute="name",
-                found=quoted(name),
-                remedy=f"the first is on line {defined[name].line}; remove one of these materials",
-            )
+            message = "another material of the robot has this name; urdfdom refuses the file"
+            remedy = f"the first is on line {defined[name].line}; remove one of these materials"
+            report.add(MATERIAL_TWICE, message, material, attribute="name", found=quoted(name), remedy=remedy)
         defined.setdefault(name, material)
     inside = {
         material.attributes.get("name", "")
@@ -252,14 +231,10 @@ def _check_material(report: Reporter, visual: Element, defined: set[str]) -> Non
     name = material.attributes.get("name")
     anonymous = name is None or (not name and (material.first("color") or material.first("texture")))
     if name is None or (name not in defined and not anonymous):
-        report.add(
-            MATERIAL_UNKNOWN,
-            "the material has no name" if name is None else "the material is not defined",
-            material,
-            attribute="name",
-            found=None if name is None else quoted(name),
-            remedy='write <material name="..."> with a <color>',
-        )
+        message = "the material has no name" if name is None else "the material is not defined"
+        remedy = 'write <material name="..."> with a <color>'
+        found = None if name is None else quoted(name)
+        report.add(MATERIAL_UNKNOWN, message, material, attribute="name", found=found, remedy=remedy)
 
 
 MESH_MISSING = Rule("URDF706", "mesh-missing", WARNING)
@@ -303,14 +278,9 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
 def check_address(report: Reporter, mesh: Element) -> None:
     filename = mesh.attributes["filename"]
     if filename.lower().startswith(("http:", "https:", "ftp:")):
-        report.add(
-            MESH_REMOTE,
-            "the mesh is on the network; it was not downloaded",
-            mesh,
-            attribute="filename",
-            found=quoted(filename),
-            remedy="copy the mesh into a package",
-        )
+        message = "the mesh is on the network; it was not downloaded"
+        remedy = "copy the mesh into a package"
+        report.add(MESH_REMOTE, message, mesh, attribute="filename", found=quoted(filename), remedy=remedy)
 
 
 def _meshes(root: Element) -> Iterator[Element]:
@@ -337,14 +307,9 @@ def _exists(path: Path) -> bool:
 
 
 def _report_file(report: Reporter, mesh: Element, filename: str) -> None:
-    report.add(
-        MESH_MISSING,
-        "the mesh is not found",
-        mesh,
-        attribute="filename",
-        found=quoted(filename),
-        remedy="kinematics needs no mesh",
-    )
+    message = "the mesh is not found"
+    remedy = "kinematics needs no mesh"
+    report.add(MESH_MISSING, message, mesh, attribute="filename", found=quoted(filename), remedy=remedy)
 
 
 def _count(number: int) -> str:

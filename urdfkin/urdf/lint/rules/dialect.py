@@ -56,14 +56,9 @@ def check_dialect(report: Reporter, root: Element) -> None:
 
 def _check_namespaces(report: Reporter, root: Element) -> None:
     if "xmlns" in root.attributes:
-        report.add(
-            NAMESPACE,
-            "xmlns puts the elements into a namespace, where most readers do not find them",
-            root,
-            attribute="xmlns",
-            found=quoted(root.attributes["xmlns"]),
-            remedy="remove xmlns",
-        )
+        message = "xmlns puts the elements into a namespace, where most readers do not find them"
+        found = quoted(root.attributes["xmlns"])
+        report.add(NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
     namespaces = {
         key.removeprefix("xmlns:"): value
         for element in root.walk()
@@ -77,13 +72,9 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
         if prefix in xacro:
             macros.append((element, None))
         elif (local == "include" and namespaces.get(prefix) == _XINCLUDE) or element.tag == "xi:include":
-            report.add(
-                INCLUDE,
-                "the file includes another file",
-                element,
-                found=quoted(element.attributes.get("href", f"<{element.tag}>")),
-                remedy="insert the content of the other file here; urdfkin did not open it",
-            )
+            remedy = "insert the content of the other file here; urdfkin did not open it"
+            found = quoted(element.attributes.get("href", f"<{element.tag}>"))
+            report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
     # A macro may contain links and joints if it is a child of <robot>.
     if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
         return
@@ -346,12 +337,8 @@ def _check_repeats(report: Reporter, element: Element) -> None:
     seen: dict[str, Element] = {}
     for child in element.children:
         if child.tag in seen and child.tag in once:
-            report.add(
-                DUPLICATE_ELEMENT,
-                f"a second <{child.tag}> is skipped; the first, on line {seen[child.tag].line}, is used",
-                child,
-                remedy="remove one of these elements",
-            )
+            message = f"a second <{child.tag}> is skipped; the first, on line {seen[child.tag].line}, is used"
+            report.add(DUPLICATE_ELEMENT, message, child, remedy="remove one of these elements")
         seen.setdefault(child.tag, child)
 
 
@@ -364,14 +351,10 @@ _REPORTED = ("xacro:", "xi:include")
 def check_prefixes(report: Reporter, root: Element) -> None:
     for prefix, places in _undeclared_prefixes(root).items():
         element, attribute = places[0]
-        report.add(
-            UNDECLARED_PREFIX,
-            f"the prefix {quoted(prefix)} is not declared; most XML readers refuse the file",
-            element,
-            attribute=attribute,
-            found=quoted(attribute or f"<{element.tag}>") + _more(places),
-            remedy=f'write xmlns:{shortened(prefix)}="..." in <robot>, or remove the names with this prefix',
-        )
+        message = f"the prefix {quoted(prefix)} is not declared; most XML readers refuse the file"
+        remedy = f'write xmlns:{shortened(prefix)}="..." in <robot>, or remove the names with this prefix'
+        found = quoted(attribute or f"<{element.tag}>") + _more(places)
+        report.add(UNDECLARED_PREFIX, message, element, attribute=attribute, found=found, remedy=remedy)
 
 
 def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
@@ -446,25 +429,15 @@ def _check_odd(report: Reporter, name: str, element: Element) -> None:
 def _check_blanks(report: Reporter, element: Element) -> None:
     raw = report.raw(element, "name") if report.has_raw_blanks else None
     if raw is not None and any(c in raw for c in "\t\r\n"):
-        report.add(
-            NAME_BLANKS,
-            "the name contains a tab or a line end",
-            element,
-            attribute="name",
-            found=quoted(raw),
-            remedy="write the name on one line, without tabs",
-        )
+        message = "the name contains a tab or a line end"
+        remedy = "write the name on one line, without tabs"
+        report.add(NAME_BLANKS, message, element, attribute="name", found=quoted(raw), remedy=remedy)
 
 
 def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
     if name == "universe" and element.tag == "joint":
-        report.add(
-            UNIVERSE,
-            "Pinocchio uses this name for the world and does not find the joint",
-            element,
-            attribute="name",
-            remedy="rename the joint",
-        )
+        message = "Pinocchio uses this name for the world and does not find the joint"
+        report.add(UNIVERSE, message, element, attribute="name", remedy="rename the joint")
     elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
         what = "the world" if name == "universe" else "the joint of a free or planar base"
         report.add(
@@ -485,14 +458,10 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
-            report.add(
-                LOOKALIKE,
-                "another name looks the same, but has different characters",
-                element,
-                attribute="name",
-                found=ascii(name) + " and " + ascii(first),
-                remedy="use only one of the two spellings",
-            )
+            message = "another name looks the same, but has different characters"
+            remedy = "use only one of the two spellings"
+            found = ascii(name) + " and " + ascii(first)
+            report.add(LOOKALIKE, message, element, attribute="name", found=found, remedy=remedy)
 
 
 BAD_COMMENT = Rule("URDF120", "bad-comment", WARNING)
@@ -530,13 +499,9 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
         remedy = f"did you mean {', '.join(dict.fromkeys(codes[word] for word in close))}?" if close else None
     else:
         what, remedy = "no reason is given", "write the reason after the bracket"
-    report.add(
-        BAD_COMMENT,
-        f"{what}, so the comment silences nothing",
-        found=quoted(f"<!--{comment.text}-->"),
-        remedy=remedy,
-        position=(comment.line, comment.column),
-    )
+    message = f"{what}, so the comment silences nothing"
+    found = quoted(f"<!--{comment.text}-->")
+    report.add(BAD_COMMENT, message, found=found, remedy=remedy, position=(comment.line, comment.column))
     return None
 
 

@@ -145,13 +145,9 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
-            report.add(
-                SEVERAL_ROOTS,
-                f"the link has no parent, and neither has {quoted(main)}",
-                robot.links[root],
-                attribute="name",
-                remedy="connect this link with a joint, or remove it",
-            )
+            message = f"the link has no parent, and neither has {quoted(main)}"
+            remedy = "connect this link with a joint, or remove it"
+            report.add(SEVERAL_ROOTS, message, robot.links[root], attribute="name", remedy=remedy)
     return False
 
 
@@ -197,14 +193,10 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
     length = math.hypot(*joint.axis)
     if not SHORTEST < length < LONGEST:
         what = "is zero" if length == 0.0 else f"has no usable length ({length:.3g})"
-        report.add(
-            NO_DIRECTION,
-            f"the axis {what}",
-            joint.axis_element,
-            attribute="xyz",
-            found=_written(joint),
-            remedy='write a unit vector, such as xyz="0 0 1"',
-        )
+        message = f"the axis {what}"
+        remedy = 'write a unit vector, such as xyz="0 0 1"'
+        found = _written(joint)
+        report.add(NO_DIRECTION, message, joint.axis_element, attribute="xyz", found=found, remedy=remedy)
     elif abs(length - 1.0) > _ONE:
         unit = unit_vector(joint.axis)
         written = " ".join(repr(x).removesuffix(".0") for x in unit)
@@ -282,14 +274,9 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
     if z > 0.0 and math.hypot(x, y) <= _LEAN * z:
         return
     at = joint.axis_element or joint.element
-    report.add(
-        PLANAR_AXIS,
-        "a planar joint moves in the XY plane of its frame, independent of <axis>",
-        at,
-        attribute="xyz",
-        found=_written(joint),
-        remedy='rotate the origin so that the normal is z, and write <axis xyz="0 0 1"/>',
-    )
+    message = "a planar joint moves in the XY plane of its frame, independent of <axis>"
+    remedy = 'rotate the origin so that the normal is z, and write <axis xyz="0 0 1"/>'
+    report.add(PLANAR_AXIS, message, at, attribute="xyz", found=_written(joint), remedy=remedy)
 
 
 INVERTED_LIMIT = Rule("URDF507", "inverted-limit", ERROR)
@@ -338,14 +325,9 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
             remedy="swap the limits" if len(written) == 2 else "write both limits",
         )
     elif lower == upper and bounded:
-        report.add(
-            EMPTY_RANGE,
-            "the joint cannot move: its limits are equal",
-            limit.element,
-            attribute="lower",
-            found=found,
-            remedy="write the range, or make the joint fixed",
-        )
+        message = "the joint cannot move: its limits are equal"
+        remedy = "write the range, or make the joint fixed"
+        report.add(EMPTY_RANGE, message, limit.element, attribute="lower", found=found, remedy=remedy)
 
 
 def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
@@ -741,12 +723,9 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
         place = (joint.parent, joint.kind, joint.xyz, joint.rpy, joint.quaternion, joint.axis)
         first = places.setdefault(place, joint)
         if first is not joint:
-            report.add(
-                SAME_PLACE,
-                f"the joint has the same origin and axis as joint {quoted(first.name)}",
-                joint.element,
-                remedy="ignore this finding if both joints are intended",
-            )
+            message = f"the joint has the same origin and axis as joint {quoted(first.name)}"
+            remedy = "ignore this finding if both joints are intended"
+            report.add(SAME_PLACE, message, joint.element, remedy=remedy)
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
