@@ -125,13 +125,11 @@ def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
     if declared is None or _codec(declared) in ("utf-8", "ascii"):
         return True
     if text.isascii() and _ASCII_SUPERSETS.match(_codec(declared) or ""):
-        report.add(
-            DECLARED_ASCII,
-            "the declared encoding is not UTF-8, but every character is ASCII",
-            found=quoted(declared),
-            remedy='write encoding="UTF-8"',
-            fix=lambda: Fix((Edit(*match.span(1), "UTF-8"),)) if (match := _ENCODING.search(text)) else None,
-        )
+        message = "the declared encoding is not UTF-8, but every character is ASCII"
+        match = _ENCODING.search(text)
+        fix = None if match is None else Fix((Edit(*match.span(1), "UTF-8"),))
+        remedy, found = 'write encoding="UTF-8"', quoted(declared)
+        report.add(DECLARED_ASCII, message, found=found, remedy=remedy, fix=lambda: fix)
         return True
     remedy = 'save the file as UTF-8 and write encoding="UTF-8"'
     report.add(DECLARED, "the declared encoding is not UTF-8", found=quoted(declared), remedy=remedy)
@@ -325,14 +323,10 @@ class _Builder:
 
     def instruction(self, target: str, text: str) -> None:
         if self.begun:
-            self.report.add(
-                INSTRUCTION,
-                "a processing instruction is not at the beginning of the file; urdfdom refuses the file",
-                found=quoted(f"<?{target} {text}".strip() + "?>"),
-                remedy="remove the instruction, or move it to the beginning of the file, where only other"
-                " instructions may precede it",
-                position=self.position(),
-            )
+            message = "a processing instruction is not at the beginning of the file; urdfdom refuses the file"
+            remedy = "remove the instruction, or move it before all other content"
+            found = quoted(f"<?{target} {text}".strip() + "?>")
+            self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
         """Report a document type declaration; stop the parser if the declaration contains definitions."""
@@ -340,13 +334,9 @@ class _Builder:
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
         if system is None and public is None and not has_subset:
-            self.report.add(
-                DOCTYPE,
-                "a document type declaration has no use in a URDF",
-                found=quoted(f"<!DOCTYPE {name}>"),
-                remedy="remove the declaration, which is ignored",
-                position=position,
-            )
+            message = "a document type declaration has no use in a URDF"
+            remedy, found = "remove the declaration, which is ignored", quoted(f"<!DOCTYPE {name}>")
+            self.report.add(DOCTYPE, message, found=found, remedy=remedy, position=position)
             return
         what = "contains definitions" if has_subset else "refers to an external definition"
         found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
@@ -378,14 +368,9 @@ class _Builder:
                 remedy = f"close {opened} first"
             elif reason in (expat.errors.XML_ERROR_NO_ELEMENTS, expat.errors.XML_ERROR_UNCLOSED_TOKEN):
                 message, remedy = "the file ends too early", f"close {opened}"
-        ended = reason == expat.errors.XML_ERROR_NO_ELEMENTS
-        self.report.add(
-            SYNTAX,
-            f"not well-formed XML: {message}",
-            found=None if ended else self._around(),
-            remedy=remedy,
-            position=(error.lineno, error.offset + 1),
-        )
+        found = None if reason == expat.errors.XML_ERROR_NO_ELEMENTS else self._around()
+        message, position = f"not well-formed XML: {message}", (error.lineno, error.offset + 1)
+        self.report.add(SYNTAX, message, found=found, remedy=remedy, position=position)
 
     def _entity_name(self) -> str | None:
         """Return the first entity name after the error position that XML does not define."""
@@ -479,13 +464,10 @@ class NumberReader:
                 return None
             values.append(value)
         if len(values) != count:
+            message = f"{attribute} needs {count} numbers, but has {len(values)}"
+            remedy, found = f"write {count} numbers separated by spaces", f"{attribute}={quoted(written)}"
             self.report.add(
-                self.bad_vector,
-                f"{attribute} needs {count} numbers, but has {len(values)}",
-                element,
-                attribute=attribute,
-                found=f"{attribute}={quoted(written)}",
-                remedy=f"write {count} numbers separated by spaces",
+                self.bad_vector, message, element, attribute=attribute, found=found, remedy=remedy
             )
             return None
         if self.report.has_raw_blanks:
@@ -495,44 +477,30 @@ class NumberReader:
     def _number(self, element: Element, attribute: str, piece: str) -> float | None:
         value = float(piece) if DECIMAL.fullmatch(piece) else None
         if value is not None and math.isfinite(value):
-            if value == 0.0 and any(digit in _NOT_ZERO for digit in re.split("[eE]", piece)[0]):
-                self.report.add(
-                    UNDERFLOW,
-                    f"{attribute} contains a number too small for a double; it is read as zero",
-                    element,
-                    attribute=attribute,
-                    found=quoted(piece),
-                    remedy="check the exponent",
-                )
+            if value == 0.0 and re.search("[1-9]", re.split("[eE]", piece)[0]):
+                message = f"{attribute} contains a number too small for a double, which is read as zero"
+                remedy, found = "check the exponent", quoted(piece)
+                self.report.add(UNDERFLOW, message, element, attribute=attribute, found=found, remedy=remedy)
             return value
         what = attribute if element.tag in _PLAIN else f"{attribute} of <{element.tag}>"
+        part = "" if piece == element.attributes[attribute] else "a part of "
+        message, remedy = f"{part}{what} is not a number", _remedy(piece)
         if value is not None:
-            message, remedy = "is too large for a double", "check the exponent"
-        else:
-            message, remedy = "is not a number", _remedy(piece)
-        self.report.add(
-            self.bad_number,
-            f"{what} {message}" if piece == element.attributes[attribute] else f"a part of {what} {message}",
-            element,
-            attribute=attribute,
-            found=quoted(piece),
-            remedy=remedy,
-        )
+            message, remedy = f"{part}{what} is too large for a double", "check the exponent"
+        found = quoted(piece)
+        self.report.add(self.bad_number, message, element, attribute=attribute, found=found, remedy=remedy)
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
         """Report a text that is too long for a number: the conversion of long texts takes quadratic time."""
         if len(written) <= most:
             return False
+        found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
+        remedy = "write 17 digits, enough for every double, or raise the limit with --max-number"
         self.report.add(
-            NUMBER_TOO_LONG,
-            f"{attribute} is too long for a number",
-            element,
-            attribute=attribute,
-            found=f"{quoted(written, 30)} of {len(written)} characters, more than {most}",
-            remedy="write 17 digits, enough for every double, or raise the limit with --max-number",
-            severity=self.bad_number.severity,
-        )
+            NUMBER_TOO_LONG, f"{attribute} is too long for a number", element,
+            attribute=attribute, found=found, remedy=remedy, severity=self.bad_number.severity,
+        )  # fmt: skip
         return True
 
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
@@ -546,22 +514,20 @@ class NumberReader:
             self._report_refused(element, attribute, "a tab or line end between or after the numbers")
 
     def _report_refused(self, element: Element, attribute: str, what: str) -> None:
-        needed = self.bad_number is BAD_NUMBER
+        value = element.attributes[attribute]
+        rule, message = WHITESPACE, f"{attribute} has {what}, which urdfdom refuses"
+        if self.bad_number is not BAD_NUMBER:  # kinematics does not use the number
+            rule, message = self.bad_number, f"{attribute} has {what}, which urdfdom does not read"
         self.report.add(
-            # urdfdom reads a file that has a wrong number which kinematics does not use.
-            WHITESPACE if needed else self.bad_number,
-            f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
+            rule,
+            message,
             element,
             attribute=attribute,
-            found=quoted(self.report.raw(element, attribute) or element.attributes[attribute]),
+            found=quoted(self.report.raw(element, attribute) or value),
             remedy="write single spaces between numbers and none around them",
-            fix=lambda: self.report.rewritten(
-                element, attribute, " ".join(element.attributes[attribute].split())
-            ),
+            fix=lambda: self.report.rewritten(element, attribute, " ".join(value.split())),
         )
 
-
-_NOT_ZERO = "123456789"
 
 #: Elements whose tags are not in messages about numbers.
 _PLAIN = ("origin", "axis", "limit")
@@ -729,14 +695,11 @@ class JointReader:
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
+            empty = "" if value is None else ", which is empty"
+            message = f"<{element.tag}> needs the attribute {attribute}{empty}"
+            found, remedy = quoted(element.text) if element.text else None, f"write {example}"
             self.report.add(
-                MISSING_ATTRIBUTE,
-                f"<{element.tag}> needs the attribute {attribute}"
-                + ("" if value is None else ", which is empty"),
-                element,
-                attribute=attribute,
-                found=quoted(element.text) if element.text else None,
-                remedy=f"write {example}",
+                MISSING_ATTRIBUTE, message, element, attribute=attribute, found=found, remedy=remedy
             )
         return value or None
 
@@ -802,14 +765,11 @@ class JointReader:
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
             return  # rule URDF212 reports text between tags
-        self.report.add(
-            EMPTY_AXIS,
-            "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
-            axis,
-            remedy='write the axis, for example <axis xyz="1 0 0"/>',
-            # A planar joint moves in the XY plane, whatever its axis is (URDF505).
-            severity=Severity.WARNING if joint.kind == "planar" else None,
-        )
+        message = "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom"
+        remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
+        # A planar joint moves in the XY plane, whatever its axis is (URDF505).
+        severity = Severity.WARNING if joint.kind == "planar" else None
+        self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 
     def _limit(self, joint: JointRecord) -> None:
         limit = joint.element.first("limit")

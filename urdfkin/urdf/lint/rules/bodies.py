@@ -278,7 +278,7 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
 def check_address(report: Reporter, mesh: Element) -> None:
     filename = mesh.attributes["filename"]
     if filename.lower().startswith(("http:", "https:", "ftp:")):
-        message = "the mesh is on the network; it was not downloaded"
+        message = "the mesh is on the network and was not downloaded"
         remedy = "copy the mesh into a package"
         report.add(MESH_REMOTE, message, mesh, attribute="filename", found=quoted(filename), remedy=remedy)
 

@@ -229,7 +229,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
         what = f"<{part.tag}>"
         if part.tag == meant:
             what = f"a {meant} inside <{part.parent.tag if part.parent else ''}>"
-        message = f"{what} is skipped, so it is missing from the robot"
+        message = f"{what} is skipped, so the element is missing from the robot"
         remedy = f"write <{meant}> as a child of <robot>"
         report.add(MISPLACED, message, part, remedy=remedy, owner=part.tag)
     if parts:
@@ -237,25 +237,16 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
     close = None if report.is_full(UNKNOWN_ELEMENT) else nearest_tag(element.tag, known)
     parent = element.parent
     if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
-        report.add(
-            STRAY_TEXT,
-            f"the value inside <{element.tag}> is skipped",
-            element,
-            found=quoted(element.text),
-            remedy=f"write the value as an attribute, as in {_EXAMPLES[parent.tag]}",
-            severity=Severity.ERROR,
-        )
+        message, found = f"the value inside <{element.tag}> is skipped", quoted(element.text)
+        remedy = f"write the value as an attribute, as in {_EXAMPLES[parent.tag]}"
+        report.add(STRAY_TEXT, message, element, found=found, remedy=remedy, severity=Severity.ERROR)
         return
+    message = f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; the element is skipped"
     remedy = f"did you mean <{close}>?" if close else "remove the element"
     if element.tag in _FOREIGN:
         remedy = f"write {_EXAMPLES['origin']}"
-    report.add(
-        UNKNOWN_ELEMENT,
-        f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; it is skipped",
-        element,
-        remedy=remedy,
-        severity=Severity.NOTE if element.tag in EXTENSIONS else None,
-    )
+    severity = Severity.NOTE if element.tag in EXTENSIONS else None
+    report.add(UNKNOWN_ELEMENT, message, element, remedy=remedy, severity=severity)
 
 
 def outside_extensions(element: Element) -> Iterator[Element]:
@@ -293,7 +284,7 @@ def _check_attributes(report: Reporter, element: Element) -> None:
         close = None if report.is_full(UNKNOWN_ATTRIBUTE) else nearest_tag(attribute, known)
         report.add(
             UNKNOWN_ATTRIBUTE,
-            f"<{element.tag}> has no attribute of this name; it is skipped",
+            f"<{element.tag}> has no attribute of this name; the attribute is skipped",
             element,
             attribute=attribute,
             found=f"{attribute}={quoted(element.attributes[attribute])}",
@@ -310,14 +301,10 @@ def _check_text(report: Reporter, element: Element) -> None:
         return  # another finding already quotes this text
     lost = element.tag in _VECTORS and not element.attributes
     example = _EXAMPLES.get(element.tag)
-    report.add(
-        STRAY_TEXT,
-        f"text inside <{element.tag}> is skipped",
-        element,
-        found=quoted(element.text),
-        remedy=f"write the value as an attribute, as in {example}" if example else "remove the text",
-        severity=Severity.ERROR if lost else None,
-    )
+    message, found = f"text inside <{element.tag}> is skipped", quoted(element.text)
+    remedy = f"write the value as an attribute, as in {example}" if example else "remove the text"
+    severity = Severity.ERROR if lost else None
+    report.add(STRAY_TEXT, message, element, found=found, remedy=remedy, severity=severity)
 
 
 _EXAMPLES = {
@@ -510,10 +497,8 @@ def check_unused(report: Reporter) -> None:
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:
-                report.add(
-                    UNUSED_COMMENT,
-                    f"{code} is silenced, but there is no such warning or note here",
-                    found=quoted(f"<!--{silence.comment.text}-->"),
-                    remedy="remove the code from the comment; an error cannot be silenced",
-                    position=(silence.comment.line, silence.comment.column),
-                )
+                comment = silence.comment
+                message = f"{code} is silenced, but there is no warning or note with this code here"
+                remedy = "remove the code from the comment; an error cannot be silenced"
+                found, position = quoted(f"<!--{comment.text}-->"), (comment.line, comment.column)
+                report.add(UNUSED_COMMENT, message, found=found, remedy=remedy, position=position)

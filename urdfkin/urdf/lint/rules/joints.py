@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 from urdfkin.urdf import parser
@@ -49,23 +50,13 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
             nearest = ", ".join(report.nearest(link, robot.links))
-            report.add(
-                UNKNOWN_LINK,
-                f"the {tag} link does not exist",
-                joint.element.first(tag),
-                attribute="link",
-                found=quoted(link),
-                remedy=f"did you mean {nearest}?" if nearest else f"add <link name={quoted(link)}/>",
-            )
+            message, at = f"the {tag} link does not exist", joint.element.first(tag)
+            remedy = f"did you mean {nearest}?" if nearest else f"add <link name={quoted(link)}/>"
+            report.add(UNKNOWN_LINK, message, at, attribute="link", found=quoted(link), remedy=remedy)
     if joint.parent is not None and joint.parent == joint.child:
-        report.add(
-            SELF_PARENT,
-            "the joint connects a link with itself",
-            joint.element.first("child"),
-            attribute="link",
-            found=quoted(joint.parent),
-            remedy="name another parent link or child link",
-        )
+        message, at = "the joint connects a link with itself", joint.element.first("child")
+        remedy, found = "name another parent link or child link", quoted(joint.parent)
+        report.add(SELF_PARENT, message, at, attribute="link", found=found, remedy=remedy)
         return False
     return joint.parent in robot.links and joint.child in robot.links
 
@@ -231,15 +222,12 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
     if snapped := _snap(axis):
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
+        message = f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}"
+        remedy = f'write xyz="{written}"; if the tilt is intended, double all three numbers'
         report.add(
-            NEARLY_COORDINATE_AXIS,
-            f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}",
-            element,
-            attribute="xyz",
-            found=_written(joint),
-            remedy=f'write xyz="{written}"; if the tilt is intended, double all three numbers',
-            weight=tilt,
-        )
+            NEARLY_COORDINATE_AXIS, message, element,
+            attribute="xyz", found=_written(joint), remedy=remedy, weight=tilt,
+        )  # fmt: skip
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
@@ -296,15 +284,13 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
             refused = strict or joint.kind in AXIAL
-            report.add(
-                NEGATIVE_LIMIT if refused else parser.IGNORED,
-                f"the limit of {attribute} is negative; Pinocchio"
-                f" {'refuses the file' if refused else 'ignores the limit'}",
-                limit.element,
-                attribute=attribute,
-                found=quoted(limit.element.attributes[attribute]),
-                remedy="write the limit without its sign",
-            )
+            rule, effect = parser.IGNORED, "ignores the limit"
+            if refused:
+                rule, effect = NEGATIVE_LIMIT, "refuses the file"
+            message = f"the limit of {attribute} is negative; Pinocchio {effect}"
+            remedy = "write the limit without its sign"
+            found = quoted(limit.element.attributes[attribute])
+            report.add(rule, message, limit.element, attribute=attribute, found=found, remedy=remedy)
     if joint.kind == "continuous":
         _check_continuous(report, limit)
     bounded = joint.kind in ("revolute", "prismatic")
@@ -316,14 +302,10 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
     found = f'lower="{lower:g}" upper="{upper:g}"' if written else "neither lower nor upper, so both are 0"
     if lower > upper:
-        report.add(
-            INVERTED_LIMIT,
-            "the lower limit is above the upper limit",
-            limit.element,
-            attribute="lower",
-            found=found if len(written) == 2 else f"{found} (a missing bound is 0)",
-            remedy="swap the limits" if len(written) == 2 else "write both limits",
-        )
+        message, remedy = "the lower limit is above the upper limit", "swap the limits"
+        if len(written) < 2:
+            found, remedy = f"{found} (a missing bound is 0)", "write both limits"
+        report.add(INVERTED_LIMIT, message, limit.element, attribute="lower", found=found, remedy=remedy)
     elif lower == upper and bounded:
         message = "the joint cannot move: its limits are equal"
         remedy = "write the range, or make the joint fixed"
@@ -335,7 +317,7 @@ def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
     if any(getattr(limit, name) for name in written):
         report.add(
             parser.IGNORED,
-            "a continuous joint has no position limits; they are ignored",
+            "a continuous joint has no position limits; the limits are ignored",
             limit.element,
             attribute=written[0],
             found=_written_bounds(limit),
@@ -671,29 +653,18 @@ def _metres(length: float) -> str:
 
 def _check_lengths(report: Reporter, joint: JointRecord) -> None:
     largest = max(abs(x) for x in joint.xyz)
+    add = partial(report.add, MILLIMETRES, remedy="write lengths in metres")
     if joint.origin_element is not None and largest >= FAR:
-        report.add(
-            MILLIMETRES,
-            "the joint is very far from its parent link",
-            joint.origin_element,
-            attribute="xyz",
-            found=f"xyz={quoted(joint.origin_element.attributes.get('xyz', ''))}",
-            remedy="write lengths in metres",
-            weight=largest,
-        )
+        message = "the joint is very far from its parent link"
+        found = f"xyz={quoted(joint.origin_element.attributes.get('xyz', ''))}"
+        add(message, joint.origin_element, attribute="xyz", found=found, weight=largest)
     limit = joint.limit
     if limit is not None and joint.kind == "prismatic":
         far = [bound for bound in (limit.lower, limit.upper) if bound and FAR <= abs(bound) < ENDLESS]
         if far:
-            report.add(
-                MILLIMETRES,
-                "a prismatic joint moves very far",
-                limit.element,
-                attribute="lower" if far[0] == limit.lower else "upper",
-                found=f"{far[0]:g}",
-                remedy="write lengths in metres",
-                weight=abs(far[0]),
-            )
+            message, found = "a prismatic joint moves very far", f"{far[0]:g}"
+            attribute = "lower" if far[0] == limit.lower else "upper"
+            add(message, limit.element, attribute=attribute, found=found, weight=abs(far[0]))
 
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
