@@ -70,7 +70,8 @@ def test_ids_and_titles_keep_their_form(rule: Rule) -> None:
     assert not page(rule.id).title.endswith(".")
     assert page(rule.id).why.endswith(".")
     assert re.match(
-        r"Pinocchio (reads|refuses) it\b.*; yourdfpy (reads|refuses) it\b.*\.$", page(rule.id).others
+        r"Pinocchio (reads|refuses) the example\b.*; yourdfpy (reads|refuses) the example\b.*\.$",
+        page(rule.id).others,
     )
 
 
@@ -124,7 +125,7 @@ def verdicts() -> dict[str, dict[str, str]]:
 def test_the_others_do_with_the_bad_example_what_the_page_says(
     rule: Rule, verdicts: dict[str, dict[str, str]]
 ) -> None:
-    pinocchio, yourdfpy = re.findall(r"(?:Pinocchio|; yourdfpy) (reads|refuses) it", page(rule.id).others)
+    pinocchio, yourdfpy = re.findall(r"(?:Pinocchio|; yourdfpy) (reads|refuses) the ex", page(rule.id).others)
     assert verdicts[rule.id] == {"pinocchio": pinocchio, "yourdfpy": yourdfpy}
 
 
