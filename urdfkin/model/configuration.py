@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, QuestionsSection, warn_caller
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, unit_quaternions
-from urdfkin.kinematics.roundings import EPS, FOLLOWER
+from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
 from urdfkin.model.tree import (
@@ -154,10 +154,10 @@ def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[f
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
     # Make the range smaller at each end, by the rounding error of the mimic joint's value.
     room = (
-        FOLLOWER * EPS * (max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)) / abs(rule.multiplier)
+        MIMIC_LIMIT * EPS * (max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)) / abs(rule.multiplier)
     )
     if not math.isfinite(room):  # The mimic joint has one limit only.
-        room = FOLLOWER * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
+        room = MIMIC_LIMIT * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
     return (
         lower if keeps(lower) else max(lower, ends[0] + room),
         upper if keeps(upper) else min(upper, ends[1] - room),
