@@ -17,7 +17,7 @@ from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint, limit, mimic
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.errors.numbers import in_radians, parse_quantity
-from urdfkin.model.configuration import places
+from urdfkin.model.configuration import coordinate_layout
 from urdfkin.model.configuration_like import CoordinateLayout
 from urdfkin.robot import Robot
 
@@ -40,7 +40,7 @@ def arm() -> Robot:
 
 
 def q_of(robot: Robot, text: Any) -> list[float]:
-    return places(robot.tree, "q").read(text).tolist()  # type: ignore[no-any-return]
+    return coordinate_layout(robot.tree, "q").read(text).tolist()  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize(
@@ -192,7 +192,7 @@ def test_any_text_is_finite_numbers_or_an_error_of_our_own(text: str) -> None:
     assert found is None or math.isfinite(found.value)
     robot = urdfkin.load("one_link", verify=False)
     with contextlib.suppress(UrdfkinError):
-        assert np.isfinite(places(robot.tree, "q").read(text)).all()
+        assert np.isfinite(coordinate_layout(robot.tree, "q").read(text)).all()
 
 
 def test_a_text_of_any_length_is_refused_at_once(arm: Robot) -> None:

@@ -17,15 +17,12 @@ from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation, quaternion_of, rotation_of, skew
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Below this squared angle (rad^2), (|w| - sin|w|)/|w|^3 is computed as a series, to avoid cancellation.
+#: Largest squared angle (rad^2) for which a series replaces (|w| - sin|w|)/|w|^3, to avoid cancellation.
 _SERIES_BELOW = 0.25
 
 
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the configuration (..., nq) that is reached from `q` in one second.
-
-    The joint velocities `v` (..., nv) are constant during this second.
-    """
+    """Return the configuration (..., nq) that `q` reaches in one second at constant velocities `v`."""
     shape = _common_shape(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
     for joint, at, to in _coordinate_joints(tree):
@@ -47,7 +44,7 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the joint velocities (..., nv) that lead from `start` to `end` (..., nq) in one second.
 
-    For the angle of a revolute joint without limits, the result is the shorter of the two rotations.
+    The result for the angle of a revolute joint without limits is the shorter of two rotations.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
@@ -71,7 +68,6 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
 
 
 def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
-    """Return the common batch shape of two arrays; raise InputError if their shapes do not broadcast."""
     try:
         return np.broadcast_shapes(one.shape[:-1], other.shape[:-1])
     except ValueError:
@@ -80,7 +76,7 @@ def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
 
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
-    """Return the joints with their own coordinates; each has the index of its first number in q and in v."""
+    """Return each joint with its own coordinates, and the indices of its first numbers in q and in v."""
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
     return [(joint, at, to) for joint, at, to in rows if joint.nv]
 
@@ -112,10 +108,9 @@ def _about_z(angle: FloatArray) -> FloatArray:
 
 
 def _V(w: FloatArray) -> FloatArray:
-    """Return the matrix V(w), (..., 3, 3), which the module's docstring defines."""
     square = (w * w).sum(axis=-1)[..., np.newaxis, np.newaxis]
     angle, W = np.sqrt(square), skew(w)
-    half = np.sinc(angle / (2.0 * math.pi))
+    half = np.sinc(angle / math.tau)
     summed = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
     cubed = np.where(
         square < _SERIES_BELOW, summed, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
