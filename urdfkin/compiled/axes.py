@@ -1,9 +1,7 @@
 """Functions with which the recursion expresses vectors in world axes or in each link's own axes.
 
-The textbook uses world axes.
-
-The rotation R of a link converts components in the link's axes to components in world axes. The joint axis
-and the interorigin vector have constant components in the link's axes.
+The textbook uses world axes. The rotation R of a link converts components in the link's axes to components in
+world axes. The joint axis and the interorigin vector have constant components in the link's axes.
 
 | axes | joint axis and interorigin vector | velocities and accelerations of the previous link |
 |---|---|---|
@@ -33,7 +31,7 @@ def seen(axes, R, x):
 
 
 def seen_after(axes, S, x):
-    """Return a velocity or acceleration x of a link after the link's frame is rotated by S.
+    """Return a link's velocity or acceleration x after the link's frame is rotated by S.
 
     In world axes, the components of x do not change. In the link's axes, they are rotated.
     """

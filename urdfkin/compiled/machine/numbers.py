@@ -1,11 +1,10 @@
 """Number types for compiled code: a value of such a type is one double or a vector of doubles.
 
-A value of type `Lanes(8)` is eight doubles in one vector register. A value of type `Lanes(1)` is one double.
-`Lanes(8)` and `Lanes(1)` are Numba types that use LLVM's vectors, so a value stays in a register from one
-equation to the next. A product x y is not computed at once. In the sum x y + z, the product and the sum are
-one fused multiply-add, which is rounded only once. This module, and not the compiler, decides which
-operations are fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every
-machine.
+A value of type `Lanes(8)` is eight doubles in one vector register, and a value of type `Lanes(1)` is one
+double. Both are Numba types that use LLVM's vectors, so a value stays in a register from one equation to the
+next. A product x y is not computed at once. In the sum x y + z, the product and the sum are one fused
+multiply-add, which is rounded only once. This module, and not the compiler, decides which operations are
+fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
 sum with zero, costs no time. If the axis is `(zero(), zero(), one())`, the compiler therefore simplifies the
@@ -141,7 +140,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether each type is one of this module's number types or an integer type.
+    """Return whether each type is a number type of this module or an integer type, but not all are integers.
 
     Equations contain integers as factors, for example the 2 in 2 (w x u).
     """
@@ -290,11 +289,9 @@ for _x in (Lanes, Product, Known):
     lower_builtin(operator.neg, _x)(_lower_neg)
 
 
+@lower_cast(Product, Lanes)
 def _multiply(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
-    return _Value(context, builder, fromty, value).number(toty.width)
-
-
-lower_cast(Product, Lanes)(_multiply)
+    return as_number(context, builder, fromty, value, toty.width)
 
 
 def _known_number(kind: Known) -> Any:
@@ -313,10 +310,8 @@ def rounded(context: Any, x: Any) -> Any:
     """Multiply the factors of a product and round the result; return other numbers unchanged."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        kind = signature.args[0]
-        return (
-            _Value(context, builder, kind, arguments[0]).number(kind.width) if kind != given else arguments[0]
-        )
+        if not isinstance(x, Product):
+            return arguments[0]
+        return as_number(context, builder, x, arguments[0], x.width)
 
-    given = Lanes(x.width) if isinstance(x, Product) else x
-    return given(x), generate
+    return (Lanes(x.width) if isinstance(x, Product) else x)(x), generate
