@@ -47,7 +47,6 @@ def third(x: Any) -> Any:
 
 
 def fresh() -> Kernel:
-    """A small kernel that this process has not compiled yet."""
     return Kernel(third, (NUMBERS,), True)
 
 
@@ -304,8 +303,6 @@ def test_a_planted_kernel_of_another_user_is_not_unpickled_and_an_old_folder_lef
 
 
 class Planted:
-    """A pickle that runs something."""
-
     ran = False
 
     def __reduce__(self) -> tuple[Callable[[], None], tuple[()]]:

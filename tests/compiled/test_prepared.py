@@ -37,7 +37,6 @@ def panda() -> Robot:
 
 
 def outcome(compute: Callable[[], FloatArray]) -> FloatArray | str:
-    """The result, or the error's type and words."""
     try:
         return compute()
     except UrdfkinError as error:
@@ -58,7 +57,6 @@ def ways(
 
 
 def agree(outcomes: list[FloatArray | str]) -> bool:
-    """Whether all are the same error, or the same array to the last bit."""
     first = outcomes[0]
     if isinstance(first, str):
         return all(isinstance(other, str) and other == first for other in outcomes)

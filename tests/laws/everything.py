@@ -13,7 +13,6 @@ from urdfkin.robot import Robot
 def by_the_robot(
     robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray
 ) -> Iterator[tuple[str, FloatArray]]:
-    """What it is, and the robot's result, for one configuration or a batch of any shape."""
     yield "placement", robot.placement(q, frame, verify=False)
     for reference in Reference:
         name = reference.name
@@ -47,5 +46,4 @@ def on_its_way_alone(
 
 
 def differing(one: FloatArray, other: FloatArray) -> bool:
-    """Whether two arrays differ in shape or in any bit, the sign of a zero included."""
     return one.shape != other.shape or one.tobytes() != other.tobytes()

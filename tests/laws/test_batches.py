@@ -93,7 +93,6 @@ def test_q_v_a_and_base_broadcast_as_numpy_does(data: st.DataObject) -> None:
 
 
 def _thinned(data: st.DataObject, shape: tuple[int, ...]) -> tuple[int, ...]:
-    """The shape with some axes 1 and some leading ones missing."""
     cut = data.draw(st.integers(0, len(shape)))
     return tuple(1 if data.draw(st.booleans()) else size for size in shape[cut:])
 
@@ -351,7 +350,6 @@ KINDS = ("revolute", "prismatic", "continuous")
 
 
 def chain(joints: int) -> Robot:
-    """A chain in which each kind of axial joint is met."""
     urdf = Urdf(f"chain_{joints}", joints)
     for i in range(joints):
         urdf.add(KINDS[i % 3])
@@ -359,7 +357,6 @@ def chain(joints: int) -> Robot:
 
 
 def mixed(floating: bool) -> Robot:
-    """Planar and floating joints between others, so that blocks of q and of v begin elsewhere."""
     urdf = Urdf("mixed", 5)
     for kind in ("revolute", "planar", "prismatic", *["floating"] * floating, "continuous", "planar"):
         urdf.add(kind)

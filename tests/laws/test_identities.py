@@ -35,13 +35,11 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 
 def frames(robot: Robot) -> list[str]:
-    """The tip, the root and one in the middle."""
     links = robot.tree.links
     return [robot.tip_frame, robot.tree.frame_name(0), robot.tree.frame_name(len(links) // 2)]
 
 
 def close(one: FloatArray, other: FloatArray, *sizes: FloatArray) -> bool:
-    """Whether two arrays agree to rounding of what they were computed from."""
     largest = max([1.0, *(float(np.abs(x).max(initial=0.0)) for x in (one, other, *sizes))])
     return bool(np.abs(one - other).max(initial=0.0) <= ROOM * largest)
 
@@ -79,7 +77,6 @@ def test_references_are_related_by_the_motion_of_a_rigid_body(robot: Robot) -> N
 
 
 def turned(R: FloatArray, six: FloatArray) -> FloatArray:
-    """[R^T linear; R^T angular]."""
     pairs = six.reshape(*six.shape[:-1], 2, 3)
     back: FloatArray = np.einsum("...ji,...pj->...pi", R, pairs).reshape(six.shape)
     return back
@@ -199,7 +196,6 @@ def test_an_elbow_of_three_and_four_metres_is_where_pythagoras_puts_it() -> None
 
 
 def room(bound: Bound) -> FloatArray:
-    """What a quantity may be off by, number for number."""
     allowed: FloatArray = EPS * bound.k * bound.scale
     return allowed
 

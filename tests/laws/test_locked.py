@@ -61,7 +61,6 @@ def held(robot: Robot, name: str) -> float:
 
 
 def kept(robot: Robot, names: list[str]) -> tuple[list[int], list[int]]:
-    """Return the indices in q and in v of the joints that are not locked."""
     tree = robot.tree
     free = [(i, j) for i, j in enumerate(tree.joints) if j.nv and j.name not in names]
     q = [tree.q_index[i] + c for i, j in free for c in range(j.nq)]

@@ -28,7 +28,6 @@ EPS = np.finfo(np.float64).eps
 
 @pytest.fixture
 def walker() -> KinematicTree:
-    """Two legs and a platform that floats, joined at the pelvis."""
     hip = shift(0.0, 0.1, 0.0) @ rotation("x", 0.3)
     knee = z_joint("right_knee", shift(0.4, 0, 0), mimic=Mimic("left_knee", -1.5, 0.2))
     rows = [

@@ -202,8 +202,6 @@ def test_a_text_of_any_length_is_refused_at_once(arm: Robot) -> None:
 
 
 class Series:
-    """As much of pandas' Series as matters here: labels, the number of each, and an array in order."""
-
     def __init__(self, data: Any, index: Any) -> None:
         self._data, self._index = np.array(data), list(index)
 
@@ -221,15 +219,11 @@ class Series:
 
 
 class DataFrame(Series):
-    """Likewise: a column for each label."""
-
     def __getitem__(self, label: Any) -> Any:
         return self._data[:, self._index.index(label)]
 
 
 class Columns:
-    """A table of another library, such as polars', whose names are its columns'."""
-
     def __init__(self, data: Any, columns: Any) -> None:
         self._data, self.columns = np.array(data), list(columns)
 
@@ -318,7 +312,6 @@ def test_names_that_stand_for_two_numbers_never_set_one_of_them_to_zero() -> Non
 
 
 def swapped(*asked: Any, right: Any = CoordinateLayout._by_name) -> Any:
-    """What a reading by name gives, its first two numbers exchanged."""
     found = right(*asked)
     found[..., [0, 1]] = found[..., [1, 0]]
     return found

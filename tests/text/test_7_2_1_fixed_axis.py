@@ -36,7 +36,6 @@ def R_k(t: Any) -> Any:
 
 
 def close(found: Any, expected: Any, room: float = 4.0) -> bool:
-    """Whether two arrays of numbers of size one differ by rounding only."""
     return bool(np.abs(np.asarray(found) - expected).max() <= room * ROUNDING)
 
 

@@ -40,7 +40,6 @@ from urdfkin.kinematics.rotation import (
 
 
 def tumbling(t: Any) -> Any:
-    """Some motion that turns about no fixed axis."""
     return about(column(1, 2, 3), mp.sin(t)) * about(column(-1, 0, 2), t * t) * about(column(0, 1, 0), 3 * t)
 
 
@@ -103,7 +102,6 @@ ANGLES, RATES = np.array([0.4, 1.3, -2.1]), np.array([0.7, -1.1, 2.3])
 
 
 def moving(name: str) -> Callable[[Any], Any]:
-    """R(t) of the sequence, angles ANGLES + t RATES, written out as a product of three turns."""
     letters, order = name.lower(), slice(None) if name.isupper() else slice(None, None, -1)
 
     def R(t: Any) -> Any:
@@ -248,7 +246,6 @@ def zyz_rates(t: float) -> FloatArray:
 
 
 def wobble(t: float) -> FloatArray:
-    """Angular velocity of a motion whose orientation is known at every time."""
     return angular_velocity_from_euler_rates("ZYZ", zyz(t), zyz_rates(t))
 
 
