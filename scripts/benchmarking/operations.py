@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from urdfkin.compiled import axes, outputs, recursion
-from urdfkin.compiled.plan import KEPT_ROWS, WIDTH, CompiledTree, Head, Op, program_of
+from urdfkin.compiled.plan import STORED_ROWS, WIDTH, CompiledTree, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
 #: Operations of a sine and a cosine (`compiled.python_numbers`): 10 reduce the angle.
@@ -127,7 +127,7 @@ def _cost(run: _Walk, instruction: list[int], quantity: str, state: tuple[Any, .
     if op <= Op.FLOATING:
         return count(run.call._over_joint(world, op, state, None, row, 0, 0, how, None, c))
     if op == Op.COLUMN:
-        run.call.column_jacobian(None, row % KEPT_ROWS, 0, how, None, c, 2, state)
+        run.call.column_jacobian(None, row % STORED_ROWS, 0, how, None, c, 2, state)
     elif op == Op.EMIT and quantity != "jacobian":
         emit = run.call.emit_velocity if quantity == "velocity" else run.call.emit_acceleration
         emit(1, None, [1] * len(Head), 0, 0, 0, 2, state, None)
