@@ -109,8 +109,8 @@ def operations(plan: CompiledTree, quantity: str) -> int:
     program, run = program_of(plan, turned=False, columns=columns), _Walk()
     words: list[int] = program.words.tolist()
     angles = (words[Head.ANGLES_END] - words[Head.ANGLES]) // 4
-    follow = {"jacobian": "place"}.get(quantity, quantity)
-    state = getattr(run.call, f"follow_{follow}")(run.state)
+    output = {"jacobian": "place"}.get(quantity, quantity)
+    state = getattr(run.call, f"mask_{output}")(run.state)
     total, at = angles * _SINE_COSINE, int(words[Head.CODE])
     while words[at] != Op.END:
         total += _cost(run, words[at : at + WIDTH], quantity, state)

@@ -8,7 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from urdfkin.kinematics.roundings import EPS, FloatArray
+from urdfkin.kinematics.inputs import FloatArray
+from urdfkin.kinematics.roundings import EPS
 
 State = TypeVar("State")
 Intermediate = TypeVar("Intermediate")

@@ -83,28 +83,22 @@ def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
 
 def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
+    p, orientation = _screw(joint, own)
+    return p, (rotation_of if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
+
+
+def _screw(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the linear and the angular part of a planar or floating joint's coordinates or velocity.
+
+    The angular part is a vector (..., 3), or the quaternion (..., 4) in a floating joint's coordinates.
+    """
     if joint.kind is JointKind.FLOATING:
-        return own[..., :3], rotation_of(own[..., 3:])
+        return own[..., :3], own[..., 3:]
     if joint.kind is not JointKind.PLANAR:
-        raise NotImplementedError(f"the pose of a {joint.kind} joint")
-    zero = np.zeros((*own.shape[:-1], 1))
-    return np.concatenate((own[..., :2], zero), axis=-1), exp_rotation(_about_z(own[..., 2]))
-
-
-def _screw(joint: Joint, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the linear and the angular part, each (..., 3), of a planar or floating joint's velocity."""
-    if joint.kind is JointKind.FLOATING:
-        return step[..., :3], step[..., 3:]
-    if joint.kind is not JointKind.PLANAR:
-        raise NotImplementedError(f"the screw of a {joint.kind} joint")
-    zero = np.zeros((*step.shape[:-1], 1))
-    return np.concatenate((step[..., :2], zero), axis=-1), _about_z(step[..., 2])
-
-
-def _about_z(angle: FloatArray) -> FloatArray:
-    turn = np.zeros((*angle.shape, 3))
-    turn[..., 2] = angle
-    return turn
+        raise NotImplementedError(f"the motion of a {joint.kind} joint")
+    linear, angular = np.zeros((2, *own.shape[:-1], 3))
+    linear[..., :2], angular[..., 2] = own[..., :2], own[..., 2]
+    return linear, angular
 
 
 def _V(w: FloatArray) -> FloatArray:

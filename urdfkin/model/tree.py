@@ -20,8 +20,10 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import FloatArray, floats, rotation_defect
+from urdfkin.kinematics import inputs
 from urdfkin.kinematics.rotation import coordinate_rotation, rotation_about
+
+FloatArray = inputs.FloatArray
 
 
 class FrameName(str):
@@ -59,26 +61,10 @@ class JointFrame(FrameName):
     prefix = "joint:"
 
 
-__all__ = [
-    "FloatArray",
-    "Joint",
-    "JointKind",
-    "KinematicTree",
-    "Limit",
-    "Lock",
-    "Mimic",
-    "build_tree",
-    "frozen",
-    "with_locks",
-    "with_root_joint",
-    "without_mimic_rules",
-]
-
-
 def frozen(array: ArrayLike) -> FloatArray:
     """Return a read-only, C-contiguous float64 copy of `array`; raises InputError if it is not numeric."""
     numeric = type(array) is np.ndarray and array.dtype == np.float64
-    copy = np.array(array if numeric else floats(array, "an array"), dtype=np.float64, order="C")
+    copy = np.array(array if numeric else inputs.floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
     return copy
 
@@ -545,7 +531,7 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 
 def is_rigid(T: FloatArray, tolerance: float) -> bool:
     """Return whether a matrix (4, 4) is a rigid transform, with a rotation matrix within `tolerance`."""
-    return bool(rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
+    return bool(inputs.rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 
 def inverse(T: FloatArray) -> FloatArray:

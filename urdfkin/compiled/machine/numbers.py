@@ -230,22 +230,6 @@ def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> 
     return _Value(context, builder, kind, value).number(width)
 
 
-def _lower_add(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    x, y = _values(context, builder, signature, arguments)
-    if _known(signature.return_type, None):
-        return context.get_dummy_value()
-    if _known(y.type, 0):
-        return x.value
-    if _known(x.type, 0):
-        return y.value
-    width = signature.return_type.width
-    if y.is_product:
-        return fused(builder, *y.factors(), x.number(width))
-    if x.is_product:
-        return fused(builder, *x.factors(), y.number(width))
-    return builder.fadd(x.number(width), y.number(width))
-
-
 def _negate(context: Any, builder: Any, x: _Value) -> Any:
     if isinstance(x.type, Known):
         return context.get_dummy_value()
@@ -255,21 +239,29 @@ def _negate(context: Any, builder: Any, x: _Value) -> Any:
     return builder.fneg(x.value)
 
 
-def _lower_sub(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    x, y = _values(context, builder, signature, arguments)
-    if _known(signature.return_type, None):
-        return context.get_dummy_value()
-    if _known(y.type, 0):
-        return x.value
-    if _known(x.type, 0):
-        return _negate(context, builder, y)
-    width = signature.return_type.width
-    if y.is_product:
-        first, second = y.factors()
-        return fused(builder, builder.fneg(first), second, x.number(width))
-    if x.is_product:
-        return fused(builder, *x.factors(), builder.fneg(y.number(width)))
-    return builder.fsub(x.number(width), y.number(width))
+def _lower_sum(*, negative: bool) -> Callable[..., Any]:
+    """Return the code generator of x + y, or of x - y if `negative` is true."""
+
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        def signed(value: Any) -> Any:
+            return builder.fneg(value) if negative else value
+
+        x, y = _values(context, builder, signature, arguments)
+        if _known(signature.return_type, None):
+            return context.get_dummy_value()
+        if _known(y.type, 0):
+            return x.value
+        if _known(x.type, 0):
+            return _negate(context, builder, y) if negative else y.value
+        width = signature.return_type.width
+        if y.is_product:
+            first, second = y.factors()
+            return fused(builder, signed(first), second, x.number(width))
+        if x.is_product:
+            return fused(builder, *x.factors(), signed(y.number(width)))
+        return builder.fadd(x.number(width), signed(y.number(width)))
+
+    return lower
 
 
 def _lower_neg(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -283,15 +275,17 @@ for _x in _KINDS:
         if _x is _y is types.Integer:
             continue
         lower_builtin(operator.mul, _x, _y)(_lower_mul)
-        lower_builtin(operator.add, _x, _y)(_lower_add)
-        lower_builtin(operator.sub, _x, _y)(_lower_sub)
+        lower_builtin(operator.add, _x, _y)(_lower_sum(negative=False))
+        lower_builtin(operator.sub, _x, _y)(_lower_sum(negative=True))
 for _x in (Lanes, Product, Known):
     lower_builtin(operator.neg, _x)(_lower_neg)
 
 
-@lower_cast(Product, Lanes)
 def _multiply(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
     return as_number(context, builder, fromty, value, toty.width)
+
+
+lower_cast(Product, Lanes)(_multiply)
 
 
 def _known_number(kind: Known) -> Any:

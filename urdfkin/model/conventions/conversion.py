@@ -501,7 +501,7 @@ class Conversion:
             B = self._block(block, q)
             part = _times(B, x[..., own])
             if v is not None:
-                part = part + _times(self._block_rate(block, q, v[..., own]), v[..., own])
+                part = part + _times(self._block(block, q, v[..., own]), v[..., own])
             found = _with(found, block.rows, part)
         return found
 
@@ -517,7 +517,7 @@ class Conversion:
             own = slice(block.v, block.v + block.joint.kind.nv)
             part = x[..., block.rows]
             if v is not None:
-                part = part - _times(self._block_rate(block, q, v[..., own]), v[..., own])
+                part = part - _times(self._block(block, q, v[..., own]), v[..., own])
             found = _with(found, own, _times(_inverse(self._block(block, q)), part))
         return found
 
@@ -553,7 +553,7 @@ class Conversion:
         found = np.zeros((*shape, self.nv, self.tree.nv))
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
-            found[..., block.rows, own] = self._block_rate(block, ours, rates[..., own])
+            found[..., block.rows, own] = self._block(block, ours, rates[..., own])
         return found
 
     def inverse_matrix(self, q: Given | None = None) -> FloatArray:
@@ -567,35 +567,28 @@ class Conversion:
         found[..., self._v_source] = _inverse(M[..., self._v_source, :])
         return found
 
-    def _block(self, block: _FreeJoint, q: FloatArray) -> FloatArray:
-        """Return the block of `matrix` for a planar joint (..., 3, 3) or a floating joint (..., 6, 6)."""
+    def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
+        """Return the block of `matrix` for a planar joint (..., 3, 3) or a floating joint (..., 6, 6).
+
+        If the joint's velocity v is given, return the time derivative of the block.
+        """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
             angle = q[..., block.q + 2]
-            B = np.zeros((*angle.shape, 3, 3))
-            B[..., 0, 0] = B[..., 1, 1] = np.cos(angle)
-            B[..., 1, 0], B[..., 0, 1] = np.sin(angle), -np.sin(angle)
-            B[..., 2, 2] = unit
+            cosine, sine = np.cos(angle), np.sin(angle)
+            if v is not None:
+                cosine, sine, unit = -sine * v[..., 2], cosine * v[..., 2], 0.0
+            B = np.zeros((*cosine.shape, 3, 3))
+            B[..., 0, 0] = B[..., 1, 1] = cosine
+            B[..., 1, 0], B[..., 0, 1], B[..., 2, 2] = sine, -sine, unit
             return B
         assert block.joint.kind is JointKind.FLOATING
-        R = rotation_of(q[..., block.q + 3 : block.q + 7])
-        A = R if how.linear == "parent" else np.broadcast_to(np.eye(3), R.shape)
-        turn = R if how.angular == "parent" else np.eye(3)
-        return self._rows(A, -A @ skew(block.point), unit * turn)
-
-    def _block_rate(self, block: _FreeJoint, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the time derivative of `_block` for the joint's velocity v."""
-        how, unit = self.convention, self.convention.angle_factor
-        if block.joint.kind is JointKind.PLANAR:
-            angle, w = np.broadcast_arrays(q[..., block.q + 2], v[..., 2])
-            B = np.zeros((*angle.shape, 3, 3))
-            B[..., 0, 0] = B[..., 1, 1] = -np.sin(angle) * w
-            B[..., 1, 0], B[..., 0, 1] = np.cos(angle) * w, -np.cos(angle) * w
-            return B
-        assert block.joint.kind is JointKind.FLOATING
-        R = rotation_of(q[..., block.q + 3 : block.q + 7]) @ skew(v[..., 3:])
-        A = R if how.linear == "parent" else np.zeros_like(R)
-        turn = R if how.angular == "parent" else np.zeros_like(R)
+        R, own_axes = rotation_of(q[..., block.q + 3 : block.q + 7]), np.eye(3)
+        if v is not None:
+            R, own_axes = R @ skew(v[..., 3:]), np.zeros((3, 3))
+        own_axes = np.broadcast_to(own_axes, R.shape)
+        A = R if how.linear == "parent" else own_axes
+        turn = R if how.angular == "parent" else own_axes
         return self._rows(A, -A @ skew(block.point), unit * turn)
 
     def _rows(self, A: FloatArray, arm: FloatArray, turn: FloatArray) -> FloatArray:
@@ -777,8 +770,9 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
     ):
         return None
     index = tuple(start._v_source[rate.at] for rate in end._rates)
-    factor = tuple(rate.factor / start._rates[k].factor for rate, k in zip(end._rates, index, strict=True))
-    return Reordering(index, factor, (0.0,) * len(index))
+    pairs = zip(end._rates, index, strict=True)
+    factors = tuple(rate.factor / start._rates[k].factor for rate, k in pairs)
+    return Reordering(index, factors, (0.0,) * len(index))
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
