@@ -10,7 +10,7 @@ import urdfkin
 from tests.odd_tree import odd_tree, pose, state
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.breakdown import KINDS, acceleration_breakdown
-from urdfkin.compiled.evaluate import accelerations, in_blocks, jacobian_rates
+from urdfkin.compiled.evaluate import accelerations, in_blocks
 from urdfkin.compiled.plan import LANES, compile_tree
 from urdfkin.errors import InputError
 from urdfkin.kinematics.inputs import FloatArray
@@ -92,15 +92,6 @@ def test_what_was_bad_in_any_part_is_told() -> None:
             np.testing.assert_array_equal(out[:, 0], q[:, 0])
 
 
-def test_a_single_configuration_gives_the_same_bits_whatever_lies_beside_it(panda: urdfkin.Robot) -> None:
-    q = panda.sample(1, seed=6)
-    expected = panda.placement(q[0], "panda_hand")
-    for neighbour in (np.nan, 1e300, -7.0):
-        memory = np.full((3, panda.nq), neighbour)
-        memory[0] = q[0]
-        np.testing.assert_array_equal(panda.placement(memory[:1], "panda_hand"), expected[None])
-
-
 # -- the parts of an acceleration: each is what it says, and together they are the whole ---------------------
 
 
@@ -161,23 +152,3 @@ def test_a_batch_may_be_empty(odd: KinematicTree) -> None:
 
 
 # -- the rate of the Jacobian: a derivative, a part of the acceleration, in three references -----------------
-
-
-EPS = np.finfo(np.float64).eps
-
-
-def test_a_plan_for_one_frame_and_a_row_of_one_give_the_same(odd: KinematicTree) -> None:
-    q, v, _ = state(odd, 35, 6)
-    whole = jacobian_rates(compile_tree(odd, range(len(odd.links))), q, v)
-    tyre = odd.link_index("tyre")
-    alone = jacobian_rates(compile_tree(odd, [tyre]), q, v)[:, 0]
-    assert np.abs(alone - whole[:, tyre]).max() <= 4 * EPS
-    first = jacobian_rates(compile_tree(odd, [tyre]), q[:1], v[:1])[0, 0]
-    assert np.abs(first - alone[0]).max() <= 4 * EPS
-
-
-def test_it_vanishes_when_nothing_moves_and_for_an_empty_batch(odd: KinematicTree) -> None:
-    plan = compile_tree(odd, [odd.link_index("wrist")])
-    q, v, _ = state(odd, 3, 8)
-    assert not jacobian_rates(plan, q, np.zeros_like(v)).any()
-    assert jacobian_rates(plan, q[:0], v[:0]).shape == (0, 1, 6, odd.nv)

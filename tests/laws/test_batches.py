@@ -49,15 +49,6 @@ def robot(request: pytest.FixtureRequest) -> Robot:
     return robot_of(request.param)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("quantity", QUANTITIES)
-def test_a_batch_equals_a_loop_over_its_samples(robot: Robot, quantity: str) -> None:
-    compute = QUANTITIES[quantity]
-    q, v, a = state(robot, 39, 1)
-    batch = compute(robot, q, v, a)
-    assert not differing(batch, np.array([compute(robot, *row) for row in zip(q, v, a, strict=True)]))
-
-
 @pytest.mark.parametrize("shape", [(), (1,), (0,), (5,), (16,), (2, 0, 3), (2, 3), (1, 4, 1, 5)])
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_any_leading_shape_comes_back(quantity: str, shape: tuple[int, ...]) -> None:
@@ -393,6 +384,7 @@ def all_frames_faults(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray)
             "velocity": robot.velocity(q, v, frames, reference),
             "jacobian": robot.jacobian(q, frames, reference),
             "acceleration": robot.acceleration(q, v, a, frames, reference),
+            "jacobian rate": robot.jacobian_rate(q, v, frames, reference),
         }
 
     frames = [f"link:{name}" for name in robot.link_names]

@@ -127,11 +127,6 @@ def test_a_path_over_a_floating_joint_says_what_to_do(walker: KinematicTree) -> 
     assert chain(walker, "balloon", "balloon").joints == ()
 
 
-def test_an_unknown_frame_offers_the_nearest_names(walker: KinematicTree) -> None:
-    with pytest.raises(UnknownNameError, match="left_foot"):
-        chain(walker, "left_fot")
-
-
 def test_the_wrong_number_of_coordinates_names_the_right_ones(walker: KinematicTree) -> None:
     with pytest.raises(InputError, match="left_hip, left_knee"):
         chain(walker, "left_foot").placement(np.zeros(3))

@@ -248,13 +248,3 @@ def test_a_moving_base_supplies_the_initial_conditions() -> None:
     found = robot("polar").acceleration(POLAR.q, POLAR.v, POLAR.a, "slider", base=base)
     assert close(found[:3], expected, 16.0)
     assert close(found[3:], alpha + R @ POLAR.alpha(2) + np.cross(w, R @ POLAR.w(2)), 16.0)
-
-
-def test_the_initial_conditions_of_a_base_at_rest_are_zero() -> None:
-    # The text prints "w-dot_{-1,0}" without "= 0": the list of initial conditions ends in the middle.
-    still = robot("elbow").acceleration(ELBOW.q, np.zeros(6), np.zeros(6), "base")
-    assert not still.any()
-    assert np.array_equal(
-        robot("elbow").acceleration(ELBOW.q, ELBOW.v, ELBOW.a, "wrist", base=BaseMotion()),
-        end_acceleration(ELBOW),
-    )
