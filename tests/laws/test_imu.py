@@ -14,9 +14,9 @@ from tests.laws.subjects import NAMES, robot_of, state
 from tests.urdfs import joint, limit
 from urdfkin.compiled import evaluate
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.configuration import draw_base
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.oracle import free_flyer
 
@@ -32,16 +32,7 @@ _INERTIA = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" 
 WITH_MASSES = re.sub(r'<link name="(\w+)"/>', rf'<link name="\1">{_INERTIA}</link>', SHAKEN)
 
 
-def moving_base(n: int, seed: int) -> BaseMotion:
-    generator = np.random.default_rng(seed)
-    quaternion = generator.standard_normal((n, 4))
-    T = np.tile(np.eye(4), (n, 1, 1))
-    T[:, :3, :3] = rotation_of(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
-    T[:, :3, 3] = generator.standard_normal((n, 3))
-    return BaseMotion(T, *generator.standard_normal((2, n, 6)))
-
-
-@pytest.mark.parametrize("base", [None, moving_base(7, 1)])
+@pytest.mark.parametrize("base", [None, draw_base(7, np.random.default_rng(1))])
 @pytest.mark.parametrize("name", NAMES)
 def test_it_reads_acceleration_less_gravity_and_angular_velocity_in_its_own_axes(
     name: str, base: BaseMotion | None
@@ -119,7 +110,7 @@ def test_mujocos_sensors_read_the_same(afloat: bool) -> None:
         sensor = getattr(mujoco.mjtSensor, f"mjSENS_{kind}")
         spec.add_sensor(name=name, type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu")
     model = spec.compile()
-    data, base = mujoco.MjData(model), moving_base(20, 8)
+    data, base = mujoco.MjData(model), draw_base(20, np.random.default_rng(8))
     q, v, a = np.random.default_rng(9).standard_normal((3, 20, 3))
     ours = urdfkin.load(SHAKEN).imu(q, v, a, "head", gravity=G, base=base if afloat else None)
     for k in range(20):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.high_precision import about, angular_velocity, array, column, mp, rate, turn
-from tests.kinematics.rotation.strategies import ROUNDING
+from tests.kinematics.rotation.strategies import ROUNDING, close
 from urdfkin.errors import RepresentationSingularityError
 from urdfkin.kinematics.rotation import (
     angular_velocity_from_euler_rates,
@@ -34,10 +34,6 @@ def R(t: Any) -> Any:
 
 
 W = array(angular_velocity(R, 0.0))
-
-
-def close(found: Any, expected: Any, room: float = 4.0) -> bool:
-    return bool(np.abs(np.asarray(found) - expected).max() <= room * ROUNDING)
 
 
 def test_7_51_the_angular_velocity_is_the_sum_of_the_rates_about_z0_y1_and_z2() -> None:
