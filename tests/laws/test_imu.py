@@ -32,7 +32,11 @@ _INERTIA = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" 
 WITH_MASSES = re.sub(r'<link name="(\w+)"/>', rf'<link name="\1">{_INERTIA}</link>', SHAKEN)
 
 
-@pytest.mark.parametrize("base", [None, draw_base(7, np.random.default_rng(1))])
+def moving_base(n: int, seed: int) -> BaseMotion:
+    return draw_base(n, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("base", [None, moving_base(7, 1)])
 @pytest.mark.parametrize("name", NAMES)
 def test_it_reads_acceleration_less_gravity_and_angular_velocity_in_its_own_axes(
     name: str, base: BaseMotion | None
@@ -110,7 +114,7 @@ def test_mujocos_sensors_read_the_same(afloat: bool) -> None:
         sensor = getattr(mujoco.mjtSensor, f"mjSENS_{kind}")
         spec.add_sensor(name=name, type=sensor, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu")
     model = spec.compile()
-    data, base = mujoco.MjData(model), draw_base(20, np.random.default_rng(8))
+    data, base = mujoco.MjData(model), moving_base(20, 8)
     q, v, a = np.random.default_rng(9).standard_normal((3, 20, 3))
     ours = urdfkin.load(SHAKEN).imu(q, v, a, "head", gravity=G, base=base if afloat else None)
     for k in range(20):
