@@ -129,20 +129,9 @@ def acceleration_breakdown(
 ) -> AccelerationBreakdown:
     """Return the contributions to the classical acceleration of a link's frame, with one leading axis n.
 
-    Args:
-        tree: The robot.
-        link: Index of the link that carries the frame.
-        q: (n, nq).
-        v: (n, nv).
-        a: (n, nv).
-        reference: The reference frame of the result.
-        base: (1 or n, 24) state of the base, see `BaseMotion.state`.
-        out: (n, joints, 4, 6) array for the terms.
-        threads: Largest number of threads; None for `evaluate.default_threads`.
-
-    Raises:
-        NotFiniteError: a number of q, v or a is not finite.
-        RangeError: a contribution exceeds the range of double precision.
+    `base` is the state of the base (1 or n, 24), see `BaseMotion.state`; `out` (n, joints, 4, 6) is an array
+    for the terms; `threads` is the largest number of threads. A number of q, v or a that is not finite raises
+    NotFiniteError; a contribution beyond the range of double precision raises RangeError.
     """
     if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
         raise NotFiniteError("q, v and a must be finite")

@@ -85,10 +85,8 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     angular velocity of frame 2 is w_01 + w_12 (7.49). The angular acceleration is the time derivative of w_01
     + w_12, which contains the term w_01 x w_12.
 
-    Args:
-        outer: Motion of frame 1 relative to frame 0.
-        inner: Motion of frame 2 relative to frame 1, expressed in frame 1. In this argument, for
-            example, `d_0_1` is the vector from O_1 to O_2.
+    `outer` is the motion of frame 1 relative to frame 0. `inner` is the motion of frame 2 relative to frame
+    1, in frame 1; for example, `inner.d_0_1` is the vector from O_1 to O_2.
     """
     R, w = outer.R_0_1, outer.w_0_1
     d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
@@ -198,11 +196,7 @@ def point_acceleration(
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
     """Return the interorigin vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64), in the frame of `z` and `x`.
 
-    Args:
-        d: (...) offset d_i along the joint's axis.
-        z: (..., 3) unit axis z_{i-1}.
-        a: (...) length a_i of the common normal.
-        x: (..., 3) unit vector x_i along the common normal.
+    The offset d_i is along the joint's axis z_{i-1}, and the length a_i along the common normal x_i.
 
     >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
     array([0.5, 0. , 0.3])

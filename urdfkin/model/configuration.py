@@ -326,10 +326,8 @@ def locked_values(
         joints: Names of the joints that stay movable. Every other joint is locked at its value in `lock`, or
             at 0 if `lock` has no value for the joint.
 
-    Raises:
-        UnknownNameError: there is no such joint or pose.
-        InputError: a joint to lock is fixed, is a mimic joint, has several coordinates or is named twice. A
-            value is not a number, or is outside the joint's limits.
+    An unknown joint or pose raises UnknownNameError. A joint to lock that is fixed, mimics another joint, has
+    several coordinates or is named twice raises InputError, and so does a value outside the joint's limits.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.named(lock, "lock")

@@ -71,15 +71,11 @@ class Conversion:
 
     Args:
         tree: The robot.
-        urdf: The URDF text of the robot. Some conventions need the order of the joints in the text, or the
-            centres of mass.
+        urdf: The URDF text, from which some conventions take the order of the joints or the centres of mass.
         convention: The convention.
         joints: Order of the joints, instead of the convention's order; required if the convention has none.
 
-    Raises:
-        InputError: a joint is missing or appears twice, two columns have the same name, or no order of joints
-            is given for a convention without an order.
-        UnknownNameError: the robot has no such joint.
+    A wrong order, or two columns with the same name, raises InputError; an unknown joint UnknownNameError.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -316,12 +312,12 @@ class Conversion:
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """The name of each number of q in the target program."""
+        """Name of each number of q in the target program."""
         return tuple(column.name for column in self._columns)
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """The name of each number of v in the target program, and of each column of its Jacobian."""
+        """Name of each number of v in the target program, and of each column of its Jacobian."""
         return tuple(rate.name for rate in self._rates)
 
     def layout(self, what: str) -> CoordinateLayout:
@@ -339,12 +335,7 @@ class Conversion:
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `q_tool = q[..., permutation]`; None if the conversion also changes numbers.
-
-        >>> import urdfkin
-        >>> urdfkin.load("a1").convention("mujoco").permutation.tolist()
-        [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
-        """
+        """Indices with `q_tool = q[..., permutation]`; None if the conversion also changes numbers."""
         return self._q_index.copy() if self._plain_q else None
 
     @property
@@ -359,7 +350,7 @@ class Conversion:
 
     @cached_property
     def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
-        """The indices of each joint in the target program's q and v, by its name in the URDF."""
+        """Indices of each joint in the target program's q and v, by its name in the URDF."""
         names = [self.tree.joints[i].name for i in self._order]
         found, q, v = {}, 0, 0
         for i, name in zip(self._order, names, strict=True):
@@ -524,14 +515,7 @@ class Conversion:
     # -- matrices ------------------------------------------------------------------------------------
 
     def matrix(self, q: Given | None = None) -> FloatArray:
-        """Return the matrix M (program's nv, nv) with v_tool = M v, or (..., program's nv, nv).
-
-        M may depend on q; if q is then missing, InputError is raised.
-
-        >>> import urdfkin
-        >>> urdfkin.load("planar_two_link").convention("alphabetical").matrix().tolist()
-        [[1.0, 0.0], [0.0, 1.0]]
-        """
+        """Return the matrix M (..., program's nv, nv) with v_tool = M v, which may depend on q."""
         M = np.zeros((self.nv, self.tree.nv))
         M[np.arange(self.nv), self._v_index] = self._v_factor
         if not self._blocks:
@@ -614,10 +598,7 @@ class Conversion:
         return np.take(array, _SWAPPED, axis) if self.angular_first else array
 
     def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1.
-
-        The module's docstring defines S and M; `columns` explains the error.
-        """
+        """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1."""
         return self.columns(q, self.six(J, -2))
 
     def columns(self, q: Given, J: ArrayLike) -> FloatArray:
@@ -626,11 +607,6 @@ class Conversion:
         The rows of J are derivatives of quantities that are the same in both conventions, such as Euler
         angles. If a column of J belongs to several joints of the target program, because one mimics the
         other, InputError is raised.
-
-        >>> import urdfkin
-        >>> a1 = urdfkin.load("a1", verify=False)
-        >>> a1.convention("mujoco").columns(a1.neutral(), [range(12)])[0, :4].tolist()
-        [3.0, 4.0, 5.0, 0.0]
         """
         self._demand_own_columns()
         array = np.asarray(J, dtype=np.float64)
@@ -680,9 +656,9 @@ class Conversion:
     ) -> FloatArray:
         """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
 
-        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. A placement is returned unchanged.
-        The function `jacobian` is called only for a time derivative of the Jacobian or a Hessian. A quantity
-        whose conversion the conventions do not define raises InputError.
+        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. The function `jacobian` is called
+        only for a time derivative of the Jacobian or a Hessian. A placement is returned unchanged, and an
+        undefined conversion raises InputError.
         """
         if quantity == "placement":
             return result
@@ -738,8 +714,8 @@ class Reordering:
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
     """Return the formula that converts "q" or "v" from convention `start` to convention `end`, or None.
 
-    There is no formula if one convention stores the cosine and the sine of an angle. There is also none if
-    the two conventions express a base velocity in different frames.
+    There is no formula if one convention stores the cosine and the sine of an angle, or if the two
+    conventions express a base velocity in different frames.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
