@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled import axes, outputs, recursion
+from urdfkin.compiled import outputs, recursion
 from urdfkin.compiled.plan import STORED_ROWS, WIDTH, CompiledTree, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
@@ -93,7 +93,7 @@ class _Walk:
             "one": lambda: one,
             "nothing": lambda: nothing,
         }
-        for module in (axes, recursion, outputs):
+        for module in (recursion, outputs):
             for name, value in vars(module).items():
                 if isinstance(value, FunctionType):
                     self.names.setdefault(name, FunctionType(value.__code__, self.names, name))

@@ -601,11 +601,7 @@ REFERENCES = {
 class KernelArgs(IntEnum):
     """Indices of the integers of a kernel; those from CORE on are only for calls with one configuration."""
 
-    @staticmethod
-    def _generate_next_value_(name: str, start: int, count: int, last_values: list[int]) -> int:
-        return count
-
-    PROGRAM = auto()
+    PROGRAM = 0
     CONSTANTS = auto()
     SCRATCH = auto()
     REFERENCE = auto()

@@ -8,14 +8,24 @@ The state of a link consists of:
 | w, vel | angular velocity, velocity of the origin | world or link axes, as `axes` selects |
 | alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
-A vector that a result does not need is `nothing()` and costs no time. This module and the modules `axes`,
-`outputs` and `recursions` contain plain functions that compute with the module `python_numbers`. The kernels
-are copies of these functions for Numba's number types (`urdfkin.compiled.machine.kernels`).
+The textbook uses world axes. The rotation R of a link converts components in the link's axes to components in
+world axes. The joint axis and the interorigin vector have constant components in the link's axes.
+
+| `axes` | joint axis and interorigin vector | velocities and accelerations of the previous link |
+|---|---|---|
+| `world_axes` | rotated by R | unchanged |
+| `link_axes` | constant: (0, 0, 1) and a constant vector | rotated to the next link's axes |
+
+The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
+add the rounding errors of another rotation.
+
+A vector that a result does not need is `nothing()` and costs no time. This module and the modules `outputs`
+and `recursions` contain plain functions that compute with the module `python_numbers`. The kernels are copies
+of these functions for Numba's number types (`urdfkin.compiled.machine.kernels`).
 """
 
 from __future__ import annotations
 
-from urdfkin.compiled.axes import seen, seen_after
 from urdfkin.compiled.plan import (
     ANGLE_ROW,
     ANGLE_WIDTH,
@@ -66,6 +76,30 @@ _END, _CARRY_X, _CARRY_Y, _CARRY_Z, _CARRY = map(int, (Op.END, Op.CARRY_X, Op.CA
 _TURN_X, _TURN_Y, _TURN_Z, _TURN = map(int, (Op.TURN_X, Op.TURN_Y, Op.TURN_Z, Op.TURN))
 _REVOLUTE, _PRISMATIC, _PLANAR, _FLOATING = map(int, (Op.REVOLUTE, Op.PRISMATIC, Op.PLANAR, Op.FLOATING))
 _SAVE, _RESUME, _STORE, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.STORE, Op.COLUMN))
+
+# -- axes -------------------------------------------------------------------------------------------
+
+
+def link_axes(own, world):
+    return own
+
+
+def world_axes(own, world):
+    return world
+
+
+def seen(axes, R, x):
+    """Return the components of x, given in the link's axes, in the axes of `link_axes` or `world_axes`."""
+    return axes(x, eq.rotate(R, x))
+
+
+def seen_after(axes, S, x):
+    """Return a link's velocity or acceleration x after the link's frame is rotated by S.
+
+    In world axes, the components of x do not change. In the link's axes, they are rotated.
+    """
+    return axes(eq.rotate(eq.transposed(S), x), x)
+
 
 # -- from one link to the next ------------------------------------------------------------------------
 

@@ -6,7 +6,6 @@ instead of addresses. The result is 1 if an input is nan, infinite or too large,
 
 from __future__ import annotations
 
-from urdfkin.compiled.axes import link_axes, world_axes
 from urdfkin.compiled.outputs import (
     column_jacobian,
     column_none,
@@ -24,7 +23,7 @@ from urdfkin.compiled.outputs import (
     store_moving_axis,
     store_none,
 )
-from urdfkin.compiled.recursion import forward_recursion
+from urdfkin.compiled.recursion import forward_recursion, link_axes, world_axes
 
 
 def placements(task):

@@ -56,6 +56,7 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
 from urdfkin.errors.validators import as_str
+from urdfkin.kinematics import equations
 from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, unit_vectors, vectors
 
 
@@ -221,12 +222,7 @@ def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
 
 def rotation_of(quat: ArrayLike) -> FloatArray:
     """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion."""
-    x, y, z, w = np.moveaxis(unit_quaternions(quat), -1, 0)
-    rows = (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
-        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
-        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
-    )
+    rows = equations.rotation_of_quaternion(*np.moveaxis(unit_quaternions(quat), -1, 0))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from urdfkin.compiled import axes, outputs, recursion, recursions
+from urdfkin.compiled import outputs, recursion, recursions
 from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
 from urdfkin.compiled.machine.compiling import Core, compiled
 from urdfkin.kinematics.arithmetic import rebound
@@ -18,7 +18,7 @@ from urdfkin.kinematics.arithmetic import rebound
 _OTHERS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}
-_INLINED: dict[str, Any] = rebound(axes, recursion, outputs, made=compiled, others=_OTHERS)
+_INLINED: dict[str, Any] = rebound(recursion, outputs, made=compiled, others=_OTHERS)
 _KERNELS: dict[str, Core] = rebound(recursions, made=Core, others=_INLINED)
 
 placements, velocities, accelerations = (

@@ -39,15 +39,8 @@ _UNITS = {"rad": 1.0, "deg": 180.0 / math.pi, "turn": 0.5 / math.pi, "m": 1.0, "
 _ANGLES, _LENGTHS = ("rad", "deg", "turn"), ("m", "mm")
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "order": (
-        "depth first, by name",
-        "depth first, by file",
-        "depth first, by link",
-        "breadth first, by name",
-        "breadth first, by file",
-        "breadth first, with fixed joints",
-        "file",
-        "name",
-        "given",
+        "depth first, by name", "depth first, by file", "depth first, by link", "breadth first, by name",
+        "breadth first, by file", "breadth first, with fixed joints", "file", "name", "given",
     ),
     "continuous": (1, 2),
     "mimic": ("none", "own"),
@@ -61,7 +54,7 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "six": ("linear first", "angular first"),
     "names": ("urdf", "usd", "identifier", "isaacsim"),
     "angle": _ANGLES,
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
