@@ -186,7 +186,7 @@ def test_batches_broadcast_or_are_refused() -> None:
     q, v = robot.sample(4), np.ones((3, 1, robot.nv))
     assert robot.integrate(q, v).shape == (3, 4, robot.nq)
     assert robot.difference(q, robot.neutral()).shape == (4, robot.nv)
-    with pytest.raises(urdfkin.InputError, match="the batch shapes do not fit"):
+    with pytest.raises(urdfkin.InputError, match="the batch shapes of the arguments do not broadcast"):
         robot.integrate(q, np.ones((3, robot.nv)))
 
 

@@ -162,7 +162,7 @@ def moving_joints(tree: KinematicTree, link: int) -> list[int]:
     return [i for i in tree.path(link) if tree.joints[i].kind.nv]
 
 
-@np.errstate(over="ignore", under="ignore", invalid="ignore")  # The last check raises an error instead.
+@np.errstate(over="ignore", under="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def _contributions(
     tree: KinematicTree,
     link: int,

@@ -25,8 +25,7 @@ from urdfkin.system.locks import importing, lock_over_forks
 #: The import of Numba uses the lock of the module `logging`, so `compiling` must be created after that lock.
 compiling = lock_over_forks()
 
-#: A function that is called with the kernel's name and None when a compilation begins, and with the kernel's
-#: name and the duration in seconds when the kernel is ready.
+#: A function of the kernel's name and the duration in seconds (None when the compilation begins).
 Listener = Callable[[str, float | None], None]
 
 

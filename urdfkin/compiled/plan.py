@@ -348,14 +348,12 @@ class Head(IntEnum):
 LANES = 8
 #: Number of integers of an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Number of integers of a joint angle: the scratch rows of the angle and of its sine, the index of the mimic
-#: rule in the constants, and 1 for a mimic joint, else 0.
+#: Number of integers of a joint angle: scratch row, scratch row of the sine, mimic rule, whether it mimics.
 ANGLE_WIDTH = 4
 #: First rows of scratch memory: the number 0, the number 1, results of a frame, a joint angle, other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, STORED_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers of a Jacobian column in a Hessian's program: the scratch row of the column, the joint's
-#: index, the index of the joint's velocity in v, and the scratch row for the sum of the column's derivatives.
+#: Number of integers of a Jacobian column of a Hessian: scratch row, joint, index in v, row of the sum.
 PAIR_WIDTH = 4
 
 _JOINTS = {

@@ -28,8 +28,7 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Time (s) of computations without a kernel after which a kernel is read from disk, or compiled in a second
-#: process, or compiled in this process.
+#: Times (s) without a kernel after which the actions in the table of the module docstring follow.
 LOADING, BESIDE, COMPILING = 0.3, 1.0, 3.0
 #: Time (s) that replaces `LOADING` after the first kernel is loaded.
 _LOADING_MORE = 0.03

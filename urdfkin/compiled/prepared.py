@@ -22,8 +22,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
 #: A function that is called as f(q, out), f(q, v, out) or f(q, v, a, out).
-#: The function returns the result, or None for arguments that it does not support; then `Robot` computes the
-#: result or raises the error.
+#: It returns None for unsupported arguments; then `Robot` computes the result or raises the error.
 Fast = Callable[..., FloatArray | None]
 
 
@@ -87,7 +86,7 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether `Robot.prepare` created this object; its first call then compiles machine code.
+        #: Whether `Robot.prepare` created this object, so that the first call compiles machine code.
         self.wanted = False
         # At the first call of a quantity, `_first` replaces the quantity's attribute by a compiled function.
         self._placement: Fast = partial(self._first, "placement")

@@ -36,7 +36,7 @@ array_equations = bound(
     product=np.matmul,
 )
 
-#: Lengths of a vector: an array with a number for each configuration, or a float for a single configuration.
+#: Length of a vector: an array with a number for each configuration, or a float for a single configuration.
 Length = Any
 
 

@@ -211,8 +211,7 @@ SINGLE_POLYNOMIAL = 1.0
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
 #: Allowed difference (in eps), for each joint, of the constant poses that two programs read from one file.
-#: If all roundings add up, the difference is 18.9.
-#: This is the sum of the first table in the module docstring, without the rotation about the axis.
+#: The worst case is 18.9: the sum of the docstring's first table without the rotation about the axis.
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
 #: Error (in eps) of the directions of two joint axes.
@@ -230,8 +229,8 @@ SUMMED = 4.0
 
 # Tolerances for rounding: a number within the tolerance of a round number is replaced by the round number.
 
-#: Error (in eps) of an angle up to pi: 1.2 for a computed multiple of pi/12, 1.1 for arctan2, and 1.0 for a
-#: number in a file (half a unit in the last place); the sum is rounded up.
+#: Error (in eps) of an angle up to pi.
+#: A computed multiple of pi/12 has an error of 1.2, arctan2 has 1.1, and a number in a file has 1.0.
 ANGLE = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
 #: The entry is a difference of two products, which has an error of 0.75.

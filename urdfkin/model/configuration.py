@@ -151,7 +151,7 @@ def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tupl
     def is_allowed(leader: float) -> bool:
         return least <= rule.multiplier * leader + rule.offset <= most
 
-    if is_allowed(lower) and is_allowed(upper):  # A mimic rule is linear.
+    if is_allowed(lower) and is_allowed(upper):  # All values between the ends are allowed too.
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
@@ -247,7 +247,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
     """Return a hint for the name of each joint that has no coordinate."""
     return {
         joint.name: Hint(
-            f"it mimics {joint.mimic.leader}: give that value, or load with mimic=False (--no-mimic)",
+            f"it mimics {joint.mimic.leader}: give that joint's value, or load with mimic=False (--no-mimic)",
             QuestionsSection.MIMIC_JOINTS,
         )
         if joint.mimic
@@ -335,7 +335,7 @@ def locked_values(
     if joints is not None:
         layout.demand_names(joints, "joints")
         if twice := sorted(chosen.intersection(joints)):
-            raise InputError("a joint to lock is also one of joints", where="lock", found=listed(twice))
+            raise InputError("a joint to lock is also in the list joints", where="lock", found=listed(twice))
         chosen |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
     elif pose is not None:
         remedy = "write NAME=VALUE, or name the joints that remain movable in joints (--joints)"

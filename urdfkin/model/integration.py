@@ -72,7 +72,7 @@ def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
         return np.broadcast_shapes(one.shape[:-1], other.shape[:-1])
     except ValueError:
         found = f"{one.shape[:-1]} and {other.shape[:-1]}"
-        raise InputError("the batch shapes do not fit together", found=found) from None
+        raise InputError("the batch shapes of the arguments do not broadcast", found=found) from None
 
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:

@@ -66,7 +66,7 @@ class Coupling:
         # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
         own = tuple(map(units.get, self.names))
         hints = {
-            joint: Hint(f"it mimics {mimic.leader}: give that value", QuestionsSection.MIMIC_JOINTS)
+            joint: Hint(f"it mimics {mimic.leader}: give that joint's value", QuestionsSection.MIMIC_JOINTS)
             for joint, mimic, _ in rules
             if mimic
         }
@@ -94,7 +94,7 @@ class Coupling:
             raise InputError(
                 f"{what} needs {len(self.names)} values on its last axis: {', '.join(self.names) or 'none'}",
                 found=f"shape {values.shape}",
-                remedy="select these from the robot's coordinates, for example with select()",
+                remedy="take the path's coordinates from the robot's q, for example with select()",
             )
         return values
 

@@ -105,8 +105,7 @@ class Limit:
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
-#: A value is far outside a joint's limits if it exceeds a limit by more than both of two amounts:
-#: `_OUTSIDE` (rad or m), and the fraction `_OF_RANGE` of the joint's range.
+#: Least distance from the limits of a value far outside: in rad or m, and as a fraction of the joint's range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 

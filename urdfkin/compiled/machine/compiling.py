@@ -63,7 +63,7 @@ class KernelCache(_Null):  # type: ignore[misc]
         if (content := get(place)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # A file that another version wrote can cause any error, even if it is not damaged.
+            # An undamaged file can cause any error too, if another version wrote the file.
             except Exception as error:
                 report_damaged(place, f"{type(error).__name__}: {error}")
         self._begin()
@@ -149,8 +149,8 @@ class InlinedCompiler(_Compiler):  # type: ignore[misc]
 _config: Any = numba.config  # Numba defines these settings at run time.
 
 #: Options of every compiled function.
-#: Without fast math, the compiler neither reorders operations nor fuses products and sums, so results do not
-#: depend on the compiler; the module `numbers` requests fused operations.
+#: Without fast math, the compiler neither reorders nor fuses operations; the module `numbers` fuses some.
+#: Results therefore do not depend on the compiler.
 #: Division by zero gives inf, as in C, so loops contain no branch that raises an error.
 #: The functions allocate no memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
@@ -227,8 +227,7 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # `compiled` is not a cached property: before Python 3.12, a cached property has a lock, which could
-        # stay locked forever in a forked child.
+        # `compiled` is not a cached property, whose lock (before Python 3.12) could stay locked after a fork.
         if name != "compiled":
             raise AttributeError(name)
         with compiling:

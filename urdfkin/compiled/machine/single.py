@@ -44,8 +44,7 @@ _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
 #: The number of axes and the flags are numbers of four bytes.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
-#: Index of the word with the byte order and the type number in the C structure PyArray_Descr (an element
-#: type), the native byte order, and the type number of doubles.
+#: Index of the word with byte order and type number in the C structure PyArray_Descr, and their values.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
 #: NumPy's flags of a C-contiguous and aligned input array, and of an output array, which is also writable.
@@ -199,7 +198,7 @@ def arrays_are_known() -> bool:
     )
 
 
-#: Kernel, kernel for LOCAL, number of inputs, and number of axes of length nv of each quantity.
+#: For each quantity: kernel, kernel for LOCAL, number of inputs, number of axes of length nv.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),

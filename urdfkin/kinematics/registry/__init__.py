@@ -193,7 +193,7 @@ def explain(number: str) -> str | None:
         return None
     if match[1] in LOST:
         return (
-            f"Equation {match[1]}\n\nPage 2 of the chapter is lost, and with it equations {', '.join(LOST)}."
+            f"Equation {match[1]}\n\nThe chapter's page 2, with equations {', '.join(LOST)}, is lost."
             "\nEvery other equation up to 7.130 is known."
         )
     return _page(equations()[match[1]])
