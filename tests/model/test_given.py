@@ -66,7 +66,7 @@ def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: 
         ("0,0,0,0", "load with mimic=False"),
         ("shoulder=1,lift=0", "q: no value for elbow; give it too, or begin with a pose"),
         ("elbo=1,shoulder=1,lift=0", "unknown coordinate 'elbo'; did you mean elbow?"),
-        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is not a coordinate; it mimics elbow: give that joint's"),
+        ("echo=1,elbow=1", "'echo' is not a coordinate; it mimics elbow: give that joint's value"),
         ("elbow=1,elbow=2,shoulder=1,lift=0", "found 'elbow' twice"),
         ("0.1,shoulder=1,elbow=1", "q: unknown pose '0.1'"),
         ("neutral,0,0", "q, lift: not a finite number: found 'neutral'"),
