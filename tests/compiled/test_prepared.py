@@ -247,15 +247,6 @@ def test_names_that_do_not_exist_are_refused_in_the_robots_words(panda: Robot) -
                 refer(FRAME, reference)  # type: ignore[arg-type]
 
 
-def test_a_reference_may_be_named_in_either_case(panda: Robot) -> None:
-    q = panda.sample(1, 4)[0]
-    for reference in Reference:
-        expected = panda.jacobian(q, FRAME, reference, threads=1)
-        for name in (reference, reference.name, reference.name.lower()):
-            assert panda.prepare(FRAME, name).reference is reference
-            assert not differing(panda.prepare(FRAME, name).jacobian(q), expected)
-
-
 def test_a_robot_where_nothing_moves_has_empty_jacobians() -> None:
     robot = urdfkin.load('<robot name="r"><link name="a"/></robot>', verify=False)
     fast = robot.prepare("a")

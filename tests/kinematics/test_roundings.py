@@ -143,11 +143,8 @@ def test_all_of_a_joints_roundings_conspiring_are_within_the_count() -> None:
     assert together == pytest.approx(22.5)
     assert together < roundings.ROUNDINGS
     assert math.hypot(most(deviation, ours), most(deviation, theirs)) < roundings.ROUNDINGS / 9.0
-
-
-def test_a_joint_of_mujocos_and_one_of_urdfkins_are_within_their_count() -> None:
-    together = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of MuJoCo's"][1]
-    assert together + 1.5 < roundings.MUJOCO
+    with_mujoco = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of MuJoCo's"][1]
+    assert with_mujoco + 1.5 < roundings.MUJOCO
 
 
 def test_a_file_of_round_angles_is_snapped_by_less_than_a_turn_counts_as() -> None:
