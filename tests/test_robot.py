@@ -274,7 +274,7 @@ def test_a_base_that_is_none_is_refused() -> None:
         ({"velocity": [1.0, 2.0]}, r"\(\.\.\., 6\)"),
         ({"velocity": "fast"}, "real numbers"),
         ({"acceleration": [0, 0, 0, 0, 0, np.nan]}, "finite"),
-        ({"velocity": np.zeros((2, 6)), "acceleration": np.zeros((3, 6))}, "do not fit"),
+        ({"velocity": np.zeros((2, 6)), "acceleration": np.zeros((3, 6))}, "do not broadcast"),
     ):
         with pytest.raises(InputError, match=message):
             BaseMotion(**words)

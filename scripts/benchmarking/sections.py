@@ -145,8 +145,8 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
-    "forward recursion": frozenset(Op) - {Op.END, Op.KEEP, Op.COLUMN, Op.EMIT},
-    "columns": frozenset((Op.KEEP, Op.COLUMN)),
+    "forward recursion": frozenset(Op) - {Op.END, Op.STORE, Op.COLUMN, Op.EMIT},
+    "columns": frozenset((Op.STORE, Op.COLUMN)),
     "writing results": frozenset((Op.EMIT,)),
 }
 

@@ -207,7 +207,6 @@ def mutants(source: str, called: Collection[str]) -> Iterator[tuple[str, ast.Mod
 
 
 def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | None:
-    """The result, if it comes with a certificate."""
     before = sum(line.unchecked for line in robot.certificate().lines)
     try:
         J = robot.analytical_jacobian(q, "tool0", representation)
@@ -218,7 +217,6 @@ def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | No
 
 @contextmanager
 def names_called() -> Iterator[set[str]]:
-    """The functions in Python that are called meanwhile."""
     names = set[str]()
     sys.setprofile(lambda frame, *_: names.add(frame.f_code.co_qualname.replace(".<locals>", "")))
     try:

@@ -45,7 +45,6 @@ REFERENCES = ("local", "world", "local_world_aligned")
 
 
 def numbers(rng: np.random.Generator, exponent: int, size: int) -> FloatArray:
-    """Numbers about 10 to the exponent, some of them zero."""
     wide: FloatArray = rng.normal(size=size) * np.exp2(math.log2(10.0) * exponent)
     wide[rng.random(size) < 0.2] = 0.0
     return wide
@@ -147,7 +146,6 @@ def test_a_scale_of_zero_means_equal_and_a_product_of_others_is_at_least_the_sma
 
 
 def two_axes(first: float, second: float) -> str:
-    """Two skew axes, at so many metres from the base and from one another."""
     return robot_of(
         joint("x", "continuous", "a", "b", f'xyz="{first!r} 0 0.1" rpy="1 0.2 0.3"'),
         joint("y", "continuous", "b", "c", f'xyz="{second!r} 0.1 0.2" rpy="1 0.2 0.3"', "0 0.6 0.8"),

@@ -20,7 +20,7 @@ import pytest
 from tests.cli.running import process
 from urdfkin import compiled as recursion
 from urdfkin import kinematics
-from urdfkin.compiled import kept, machine
+from urdfkin.compiled import kernel_cache, machine
 from urdfkin.compiled.machine import compiling
 from urdfkin.compiled.machine.compiling import NUMBERS, Kernel
 from urdfkin.system import cache
@@ -47,7 +47,6 @@ def third(x: Any) -> Any:
 
 
 def fresh() -> Kernel:
-    """A small kernel that this process has not compiled yet."""
     return Kernel(third, (NUMBERS,), True)
 
 
@@ -304,8 +303,6 @@ def test_a_planted_kernel_of_another_user_is_not_unpickled_and_an_old_folder_lef
 
 
 class Planted:
-    """A pickle that runs something."""
-
     ran = False
 
     def __reduce__(self) -> tuple[Callable[[], None], tuple[()]]:
@@ -337,7 +334,7 @@ def test_every_file_of_the_part_is_among_the_sources(tmp_path: Path, monkeypatch
         return tmp_path
 
     monkeypatch.setattr(cache, "kept_folder", noting)
-    uncached: Callable[[], Path | None] = kept.cache_folder.__wrapped__
+    uncached: Callable[[], Path | None] = kernel_cache.cache_folder.__wrapped__
     assert uncached() == tmp_path
     folders = [Path(str(module.__file__)).parent for module in (recursion, machine, kinematics)]
     files = {path for folder in folders for path in folder.glob("*.py")}

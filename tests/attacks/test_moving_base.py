@@ -50,7 +50,6 @@ def test_a_rotation_printed_with_nine_decimals_is_taken_and_one_that_is_exact_st
 
 
 def nearest_at_50_digits(M: FloatArray) -> FloatArray:
-    """The orthogonal factor of the polar decomposition, by Newton's iteration on the inverse."""
     with mp.workdps(50):
         X = mp.matrix(M.tolist())
         for _ in range(8):

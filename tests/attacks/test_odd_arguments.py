@@ -157,7 +157,7 @@ def test_many_threads_are_no_more_work_than_the_batch_and_the_processors(
     counted = []
     parts = evaluate._parts
 
-    def counting(n: int, threads: int) -> list[tuple[int, int]]:
+    def counting(n: int, threads: int) -> list[slice]:
         counted.append(threads)
         return parts(n, threads)
 

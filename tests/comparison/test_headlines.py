@@ -146,9 +146,9 @@ def test_intervals_cover_the_files_limits_where_mimic_joints_leave_theirs() -> N
     assert [found.exit_code(within=most) for most in (1e-4, 5.49e-4, 5.6e-4)] == [1, 1, 0]
     said = "NOT WITHIN 0.0001 m and rad without changes of B: b is 0.55 mm"
     assert headline(a, b, within=1e-4).startswith(said)
-    own = "joint ja ranges over -0.005 to 0.055 m; its mimic joints keep their limits from"
+    own = "joint ja ranges over -0.005 to 0.055 m; its mimic joints are within their limits only for values"
     ends = ("A", "0.005"), ("B", "0.0049505")
-    assert found.narrowed == tuple(f"{model}: {own} -0.005 to {end} only (jb)" for model, end in ends)
+    assert found.narrowed == tuple(f"{model}: {own} from -0.005 to {end} (jb)" for model, end in ends)
 
 
 def test_nothing_is_within_anything_where_no_bound_was_asked_for() -> None:
@@ -168,7 +168,7 @@ def test_the_command_answers_what_was_asked(tmp_path: Path) -> None:
     done = run("same", f, g, "--within", "1e-3")
     assert done.code == 0
     assert "WITHIN 0.001 m and rad" in done.text
-    assert "keep their limits from -0.005 to 0.005 only" in done.text
+    assert "within their limits only for values from -0.005 to 0.005" in done.text
 
 
 def test_the_page_follows_the_question_and_says_where_it_comes_from(tmp_path: Path) -> None:

@@ -123,7 +123,6 @@ def test_one_result_needs_no_cache(tmp_path: Path) -> None:
 
 @pytest.fixture
 def unspent(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """A process in which nothing is loaded; the names of the kernels that it loads."""
     loaded: list[str] = []
     for name in ("_spent", "_loaded", "_beside"):
         monkeypatch.setattr(preload, name, {})

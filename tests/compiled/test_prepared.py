@@ -37,7 +37,6 @@ def panda() -> Robot:
 
 
 def outcome(compute: Callable[[], FloatArray]) -> FloatArray | str:
-    """The result, or the error's type and words."""
     try:
         return compute()
     except UrdfkinError as error:
@@ -58,7 +57,6 @@ def ways(
 
 
 def agree(outcomes: list[FloatArray | str]) -> bool:
-    """Whether all are the same error, or the same array to the last bit."""
     first = outcomes[0]
     if isinstance(first, str):
         return all(isinstance(other, str) and other == first for other in outcomes)
@@ -247,15 +245,6 @@ def test_names_that_do_not_exist_are_refused_in_the_robots_words(panda: Robot) -
         for refer in (panda.prepare, lambda frame, other: panda.jacobian(q, frame, other)):
             with pytest.raises(UnknownNameError, match="unknown reference"):
                 refer(FRAME, reference)  # type: ignore[arg-type]
-
-
-def test_a_reference_may_be_named_in_either_case(panda: Robot) -> None:
-    q = panda.sample(1, 4)[0]
-    for reference in Reference:
-        expected = panda.jacobian(q, FRAME, reference, threads=1)
-        for name in (reference, reference.name, reference.name.lower()):
-            assert panda.prepare(FRAME, name).reference is reference
-            assert not differing(panda.prepare(FRAME, name).jacobian(q), expected)
 
 
 def test_a_robot_where_nothing_moves_has_empty_jacobians() -> None:

@@ -29,7 +29,6 @@ _Z = (0, 0, 1)
 
 
 def stepped(robot: Robot, q: FloatArray, rate: int, step: Any) -> list[Any]:
-    """Coordinates as they go on with one rate, to first order in the step."""
     out: list[Any] = [exact(x) for x in q]
     tree = robot.tree
     for joint, at, rate_at in zip(tree.joints, tree.q_index, tree.v_index, strict=True):

@@ -61,7 +61,6 @@ def held(robot: Robot, name: str) -> float:
 
 
 def kept(robot: Robot, names: list[str]) -> tuple[list[int], list[int]]:
-    """Return the indices in q and in v of the joints that are not locked."""
     tree = robot.tree
     free = [(i, j) for i, j in enumerate(tree.joints) if j.nv and j.name not in names]
     q = [tree.q_index[i] + c for i, j in free for c in range(j.nq)]
@@ -337,7 +336,10 @@ def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() ->
     ("options", "words"),
     [
         ({"lock": {"elbow": 1.0}}, "unknown coordinate 'elbow'"),
-        ({"lock": {"panda_finger_joint2": 0.01}}, "it mimics panda_finger_joint1: give that value"),
+        (
+            {"lock": {"panda_finger_joint2": 0.01}},
+            "it mimics panda_finger_joint1: give that joint's value",
+        ),
         ({"lock": {"panda_joint8": 0.0}}, "leave out this fixed joint"),
         ({"lock": {"panda_finger_joint1": 4.0}}, "4 is outside [0, 0.04]"),
         ({"lock": {"panda_joint1": 90}}, "degrees? write 90deg"),
@@ -351,7 +353,7 @@ def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() ->
         ({"joints": ["elbow"]}, "unknown coordinate 'elbow'"),
         ({"joints": "panda_joint1"}, "must be a list of names"),
         ({"joints": ["panda_joint1"]}, "give a value within them: lock={'panda_joint4': VALUE}"),
-        ({"joints": ["panda_joint1"], "lock": {"panda_joint1": 0.0}}, "is also one of joints"),
+        ({"joints": ["panda_joint1"], "lock": {"panda_joint1": 0.0}}, "is also in the list joints"),
         ({"joints": ["panda_finger_joint2"]}, "it mimics panda_finger_joint1"),
     ],
 )

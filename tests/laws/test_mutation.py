@@ -48,7 +48,6 @@ USED = (
 
 
 def with_a_slip(equation: str, term: str) -> ModuleType:
-    """The equations, one term of one of them made larger."""
     tree = ast.parse(inspect.getsource(equations))
     (function,) = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == equation]
 
@@ -66,7 +65,6 @@ def with_a_slip(equation: str, term: str) -> ModuleType:
 
 
 def farthest(robot: Robot) -> float:
-    """How far Pinocchio is from the judge at most, in eps * scale."""
     return max(line.pinocchio.worst for line in judge(robot, samples=2).lines)
 
 

@@ -23,7 +23,6 @@ from urdfkin.urdf.catalogue import catalogue
 
 @pytest.fixture
 def hand() -> KinematicTree:
-    """A palm with a thumb of one joint and a finger of two, the second following the first."""
     rows = [
         (joint("tip", mimic=Mimic("finger", 0.5, 0.1)), "finger_link", "tip_link"),
         (joint("thumb", kind=JointKind.CONTINUOUS), "palm", "thumb_link"),
@@ -187,7 +186,7 @@ def test_batches_broadcast_or_are_refused() -> None:
     q, v = robot.sample(4), np.ones((3, 1, robot.nv))
     assert robot.integrate(q, v).shape == (3, 4, robot.nq)
     assert robot.difference(q, robot.neutral()).shape == (4, robot.nv)
-    with pytest.raises(urdfkin.InputError, match="the batch shapes do not fit"):
+    with pytest.raises(urdfkin.InputError, match="the batch shapes of the arguments do not broadcast"):
         robot.integrate(q, np.ones((3, robot.nv)))
 
 
@@ -206,7 +205,6 @@ LOWER, UPPER = -0.7, 1.3
 
 
 def two_joints(mimic: Mimic | None = None) -> KinematicTree:
-    """A joint `a` with bounds, and a sliding one `b` that may go from 0 to 0.1 m."""
     a = joint("a", limit=Limit(LOWER, UPPER, 1.0, 1.0))
     b = joint("b", kind=JointKind.PRISMATIC, limit=Limit(0.0, 0.1, 1.0, 1.0), mimic=mimic)
     return build_tree("two", "l0", [(a, "l0", "l1"), (b, "l1", "l2")])
@@ -246,7 +244,6 @@ def test_a_joint_without_bounds_and_a_batch_without_rows_are_never_outside() -> 
 
 
 def with_everything() -> KinematicTree:
-    """A wheel, a planar joint, and a follower of the wheel that turns without end too."""
     joints = [
         joint("wheel", kind=JointKind.CONTINUOUS),
         joint("table", kind=JointKind.PLANAR),

@@ -489,7 +489,7 @@ def _values(
     robot: Robot, letter: str, text: str, where: str, rng: Any, conversion: Conversion | None
 ) -> FloatArray:
     """Return the values of --q, --v or --a as an array with one row for each sample."""
-    from urdfkin.model.configuration import places, sample
+    from urdfkin.model.configuration import coordinate_layout, sample
     from urdfkin.robot.trajectory import column_units
 
     known = conversion or robot
@@ -504,7 +504,7 @@ def _values(
         return conversion.to(drawn) if conversion else drawn
     if text.startswith("@"):
         return read_batch(Path(text[1:]), where, (names,), column_units(robot, letter, conversion))[0]
-    layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
+    layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     return layout.read(text, where)[None]
 
 

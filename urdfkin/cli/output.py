@@ -158,7 +158,7 @@ def format_option(
 @contextmanager
 def compiling() -> Iterator[None]:
     """Print a line when a kernel is compiled, and then the time; each kernel is compiled only once."""
-    from urdfkin.compiled.kept import listen_to_compile_events
+    from urdfkin.compiled.kernel_cache import listen_to_compile_events
 
     hints = [", once; 'urdfkin warm' compiles all kernels"]
 

@@ -18,7 +18,7 @@ def command() -> None:
     seconds. Kernels are stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit
     2: the kernels cannot be stored.
     """
-    from urdfkin.compiled.kept import cache_folder, listen_to_compile_events
+    from urdfkin.compiled.kernel_cache import cache_folder, listen_to_compile_events
     from urdfkin.compiled.machine import kernels
     from urdfkin.compiled.machine.single import one_configuration
     from urdfkin.verify.comparison import load_kernels

@@ -38,7 +38,7 @@ import numpy as np
 
 from urdfkin.compiled.evaluate import jacobians, placements
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.kinematics.roundings import EPS, FOLLOWER, NOT_ZERO
+from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT, NOT_ZERO
 from urdfkin.model.configuration import WIDEST, neutral, sample, with_unit_quaternions
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
@@ -154,9 +154,9 @@ class DistanceSearch:
             tree, q = (self.robots[0].tree, q_a) if name.startswith("a:") else (self.robots[1].tree, q_b)
             z[0, k] = q[0, tree.q_index[tree.joint_index(name[2:])]]
         low, high = self.ends.T
-        room = EPS * FOLLOWER * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+        room = EPS * MIMIC_LIMIT * (1.0 + np.maximum(np.abs(low), np.abs(high)))
         alike = all(
-            (np.abs(mapped - q) <= EPS * FOLLOWER * (1.0 + np.abs(mapped))).all()
+            (np.abs(mapped - q) <= EPS * MIMIC_LIMIT * (1.0 + np.abs(mapped))).all()
             for mapped, q in zip(self.configurations(z), (q_a, q_b), strict=True)
         )
         return alike and bool((low - room <= z).all() and (z <= high + room).all())

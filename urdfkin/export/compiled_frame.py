@@ -25,7 +25,7 @@ from typing import Any, Protocol, TypeGuard
 import numpy as np
 
 from urdfkin.compiled.evaluate import in_blocks, is_staged
-from urdfkin.compiled.kept import compiling
+from urdfkin.compiled.kernel_cache import compiling
 from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, lines
 from urdfkin.compiled.prepared import Fast
 from urdfkin.errors import NotFiniteError, RangeError

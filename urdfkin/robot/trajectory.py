@@ -37,7 +37,7 @@ from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.inputs import FloatArray, scalars
 from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_of
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import checked, places
+from urdfkin.model.configuration import checked, coordinate_layout
 from urdfkin.model.configuration_like import Given, listed, wrong_count
 from urdfkin.model.integration import difference, integrate
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, frozen
@@ -377,7 +377,7 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
     """Return the unit of each number of "q", "v" or "a" by its name, such as "m/s"; "" for quaternions."""
-    layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
+    layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
         name: f"{unit}{per}" if unit else "" for name, unit in zip(layout.names, layout.units, strict=True)

@@ -18,7 +18,7 @@ from urdfkin.compiled.plan import compile_tree
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import Samples
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, freed
+from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, without_mimic_rules
 from urdfkin.robot import Robot
 from urdfkin.validation.error_stats import Inputs, Key, Tally, ThreeSides, tally, three_sides
 from urdfkin.validation.timings import Clock
@@ -166,7 +166,7 @@ class _Screws(_ComparisonBatch):
 
     def tallies(self) -> Iterator[Tally]:
         robot, x = self.robot, self.x
-        tree = freed(robot.tree)
+        tree = without_mimic_rules(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
         theirs = self.clock.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]

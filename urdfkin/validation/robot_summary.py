@@ -84,7 +84,7 @@ def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
     """Return the part of a joint's range in which its mimic joints are within limits; None: not narrowed."""
     if narrowed is None:
         return None
-    lower, upper = narrowed.kept or (None, None)
+    lower, upper = narrowed.allowed or (None, None)
     return {"lower": lower, "upper": upper, "by": narrowed.by}
 
 

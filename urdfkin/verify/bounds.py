@@ -202,7 +202,7 @@ class _Lengths(NamedTuple):
 
 def _lengths(plan: CompiledTree) -> _Lengths:
     """Return the moving joints and the frames of a compiled tree, which stores the result for later calls."""
-    found: _Lengths | None = plan.made.get("lengths")
+    found: _Lengths | None = plan.cache.get("lengths")
     if found is None:
         lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
         rules = np.abs(plan.geometry[:, Geometry.MULTIPLIER :]).tolist()
@@ -219,7 +219,7 @@ def _lengths(plan: CompiledTree) -> _Lengths:
             np.array([end[:2] for end in ends], dtype=np.int64).reshape(-1, 2),
             np.array([end.length for end in ends]),
         )
-        found = plan.made["lengths"] = _Lengths(links, ends, tables)
+        found = plan.cache["lengths"] = _Lengths(links, ends, tables)
     return found
 
 
@@ -650,9 +650,9 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
 
     Each sum is an array (frames, nv). An independent joint has the multiplier 1.
     """
-    weights: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
+    weights: tuple[FloatArray, FloatArray] | None = plan.cache.get("column weights")
     if weights is None:
-        weights = plan.made["column weights"] = _column_weights(plan)
+        weights = plan.cache["column weights"] = _column_weights(plan)
     return weights
 
 

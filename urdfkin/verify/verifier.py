@@ -432,12 +432,12 @@ def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Boun
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0
     key = "bound", quantity.name, x.reference, by.name
-    bound: Bound | None = x.plan.made.get(key) if constant else None
+    bound: Bound | None = x.plan.cache.get(key) if constant else None
     if bound is None:
         q = x.q[:1] if constant else x.q
         bound = quantity.bound(x.plan, by.size(magnitudes(x.plan, q, v, a, x.state)), x.reference)
         if constant:
-            x.plan.made[key] = bound
+            x.plan.cache[key] = bound
     return bound
 
 

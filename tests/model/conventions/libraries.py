@@ -94,7 +94,6 @@ def bare(text: str) -> str:
 
 
 def _root(robot: Robot) -> str:
-    """Return the name of the root link in the bare text."""
     name = robot.link_names[int(robot.root_joint is not None)]
     return "root" if name == "world" else name
 

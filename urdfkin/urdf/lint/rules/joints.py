@@ -446,14 +446,14 @@ class _MimicChecker:
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
         """Check that the limits of a mimic joint allow the full range of the mimicked joint."""
-        from urdfkin.model.configuration import kept_range, range_words
+        from urdfkin.model.configuration import allowed_range, range_words
         from urdfkin.model.tree import Limit
 
         rule, leader = self.resolved(mimic)
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
-        low, high = kept_range(rule, Limit(*limits, math.inf, math.inf), *moving)
+        low, high = allowed_range(rule, Limit(*limits, math.inf, math.inf), *moving)
         if low <= high and (
             rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0])
         ):
