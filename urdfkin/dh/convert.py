@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.table import DHConvention, DHRow, DHTable, as_step, convention_of
+from urdfkin.dh.table import DHConvention, DHRow, DHTable, as_a_and_alpha, convention_of
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -48,7 +48,7 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
 
 def to_modified(table: DHTable) -> DHTable:
     """Convert a standard table to a modified table: row i takes a, alpha and beta from row i - 1."""
-    first = as_step(table.base)
+    first = as_a_and_alpha(table.base)
     steps = [(*(first or (0.0, 0.0)), 0.0), *((row.a, row.alpha, row.beta) for row in table.rows[:-1])]
     base = np.eye(4) if first else table.base
     return _with(table, DHConvention.MODIFIED, steps, base, table.rows[-1].X @ table.tool)
@@ -56,7 +56,7 @@ def to_modified(table: DHTable) -> DHTable:
 
 def to_standard(table: DHTable) -> DHTable:
     """Convert a modified table to a standard table: row i takes a, alpha and beta from row i + 1."""
-    last = as_step(table.tool)
+    last = as_a_and_alpha(table.tool)
     steps = [*((row.a, row.alpha, row.beta) for row in table.rows[1:]), (*(last or (0.0, 0.0)), 0.0)]
     tool = np.eye(4) if last else table.tool
     return _with(table, DHConvention.STANDARD, steps, table.base @ table.rows[0].X, tool)

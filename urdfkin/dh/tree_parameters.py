@@ -28,16 +28,15 @@ from urdfkin.dh.common_normals import (
     AxisTransform,
     NearParallel,
     PoseTolerance,
-    cleaned_angle,
+    check_lengths,
     cleaned_length,
-    demand_squares,
-    noise_of,
+    pose_tolerance,
     step_between,
     tilt_of,
 )
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
 from urdfkin.dh.export.text import added
-from urdfkin.dh.table import along_axis, between_axes
+from urdfkin.dh.table import along_axis, between_axes, cleaned_angle
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
@@ -179,7 +178,7 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
         InputError: the robot has a planar or floating joint, which has no single axis.
         RangeError: the square of a length is outside the range of doubles.
     """
-    demand_squares(tree.joints)
+    check_lengths(tree.joints)
     for joint in tree.joints:
         if joint.kind not in _SIGMA:
             raise InputError(
@@ -234,7 +233,7 @@ def _links(tree: KinematicTree) -> list[_LinkAxis]:
         antecedent, T, folded = carriers[joint.parent]
         align = turned(joint)
         here = T @ joint.T_parent_joint @ align
-        noise, tilt = noise_of(folded + 1, 0.0, way), tilt_of(here)
+        noise, tilt = pose_tolerance(folded + 1, 0.0, way), tilt_of(here)
         left_out = links[antecedent].left_out if antecedent >= 0 else 0.0
         left_out += tilt if tilt <= noise.radians else 0.0
         links.append(_LinkAxis(antecedent, here, align, noise, left_out))
@@ -263,7 +262,7 @@ def _steps(
         start = -before if defines else known
         step = step_between(link.T_antecedent_axis, way, NearParallel.HAYATI, start, noise=link.noise)
         if abs(cleaned_angle(step.phi - start)) > np.pi / 2.0 + RIGHT_ANGLE_SLACK:
-            step = step.turned()
+            step = step.with_reversed_x()
         if defines:
             own[i] = (step.phi, step.delta)
         steps.append(step)

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.common_normals import demand_squares_of
+from urdfkin.dh.common_normals import check_lengths_of_table
 from urdfkin.dh.compare.fit import (
     CELLS,
     TableArrays,
@@ -171,7 +171,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
             found=f"{words[0]} in the table, {words[1]} in the URDF",
             remedy="choose a base and a tip so that the path has exactly the joints of the table",
         )
-    demand_squares_of(chain, reference)
+    check_lengths_of_table(chain, reference)
 
 
 def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:

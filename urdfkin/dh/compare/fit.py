@@ -32,7 +32,13 @@ from functools import cached_property
 
 import numpy as np
 
-from urdfkin.dh.common_normals import FAR_FEET, NEARLY_PARALLEL, AxisTransform, NearParallel, step_between
+from urdfkin.dh.common_normals import (
+    LARGEST_HAYATI_TILT,
+    NEARLY_PARALLEL,
+    AxisTransform,
+    NearParallel,
+    step_between,
+)
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHRow, DHTable, along_axis, between_axes
 from urdfkin.kinematics.least_squares import least_squares
@@ -582,7 +588,7 @@ def _extend(
 
 
 def _absorber(partial: _Partial, step: AxisTransform, i: int, turns: bool) -> tuple[int, float] | None:
-    if not step.free:
+    if not step.phi_is_free:
         return None
     sign = math.copysign(1.0, math.cos(step.alpha))
     if turns or i == 0:
@@ -622,7 +628,7 @@ def _steps(
     """
     steps = []
     sine = math.hypot(A[0, 2], A[1, 2])
-    near = abs(math.sin(row.alpha)) < FAR_FEET and sine < FAR_FEET
+    near = abs(math.sin(row.alpha)) < LARGEST_HAYATI_TILT and sine < LARGEST_HAYATI_TILT
     if not near or row.beta == 0.0:
         steps.append(step_between(A, reach, NearParallel.STRICT, phi_free))
     if near:
@@ -635,7 +641,7 @@ def _steps(
         steps.append(replace(cut, delta=cut.delta + delta))
     for step in steps:
         yield step
-        yield replace(step.turned(), free=step.free)
+        yield replace(step.with_reversed_x(), phi_is_free=step.phi_is_free)
 
 
 def _close_chain(best: _Partial, chain: FrameChain, reference: DHTable) -> SignedFit:
