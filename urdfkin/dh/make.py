@@ -14,7 +14,7 @@ import numpy as np
 
 from urdfkin.dh.common_normals import NearParallel, check_lengths
 from urdfkin.dh.compare.agreement import check_joints
-from urdfkin.dh.compare.fit import align
+from urdfkin.dh.compare.signs import align
 from urdfkin.dh.convert import to_convention
 from urdfkin.dh.derive import Choices, First, Last, ParallelOffset, Sign, Slide, choice, derive
 from urdfkin.dh.snapping import check_tolerance, row_of_constant, snap_chain, snap_report, snap_thetas
