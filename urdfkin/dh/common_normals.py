@@ -21,7 +21,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
@@ -38,13 +37,6 @@ NEARLY_PARALLEL = 1e-2
 #: Largest tilt (rad) of nearly parallel axes.
 #: Axes with a tilt above `NEARLY_PARALLEL` are nearly parallel only if their common normal is far away.
 LARGEST_HAYATI_TILT = 0.35
-
-
-class NearParallel(StrEnum):
-    """Kind of row for two nearly parallel axes: a Hayati row, or a row of four parameters."""
-
-    HAYATI = "hayati"
-    STRICT = "strict"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +77,9 @@ def shifted_along_z(A: FloatArray, distance: float) -> FloatArray:
 def step_between(
     A: FloatArray,
     reach: float,
-    near_parallel: NearParallel,
     phi_free: float = 0.0,
+    *,
+    hayati: bool,
     delta_each: bool = False,
     noise: PoseTolerance | None = None,
 ) -> AxisTransform:
@@ -96,8 +89,8 @@ def step_between(
         A: (4, 4) pose of the next joint's frame in this joint's frame.
         reach: Length of the path (metres). A common normal is far away if its distance from a joint frame
             exceeds `reach`.
-        near_parallel: Kind of row for nearly parallel axes.
         phi_free: Value of phi for coinciding axes, for which every phi is correct.
+        hayati: Whether nearly parallel axes get a Hayati row instead of a row of four parameters.
         delta_each: For parallel axes: True if `delta` contains the offset, False if `delta_next` contains it.
         noise: Limits for tilts and lengths; smaller values are set to zero. None: the limits for the origin
             of a single URDF joint.
@@ -109,7 +102,7 @@ def step_between(
     step = _along_common_normal(A, sine, reach, noise)
     is_far = max(abs(step.delta), abs(step.delta_next)) > reach
     is_near_parallel = sine < NEARLY_PARALLEL or (sine < LARGEST_HAYATI_TILT and is_far)
-    if near_parallel is NearParallel.HAYATI and is_near_parallel:
+    if hayati and is_near_parallel:
         return hayati_step(A, reach, noise, phi_free)
     return step
 
@@ -192,7 +185,7 @@ class PairWithReference:
     row: DHRow
     reach: float
     noise: PoseTolerance
-    near_parallel: NearParallel
+    hayati: bool
 
     @property
     def is_prismatic(self) -> bool:
@@ -208,14 +201,14 @@ class PairWithReference:
         """Whether the two axes get a Hayati row: always for a small tilt, else as in the reference."""
         sine = tilt_of(self.A)
         reference_is_strict = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
-        return self.near_parallel is NearParallel.HAYATI and (
+        return self.hayati and (
             sine < NEARLY_PARALLEL or (sine < LARGEST_HAYATI_TILT and not reference_is_strict)
         )
 
     @property
     def normal_offset(self) -> float:
         """Distance (metres) along the first axis, from the frame of its joint to the common normal."""
-        return step_between(self.A, self.reach, NearParallel.STRICT, noise=self.noise).delta
+        return step_between(self.A, self.reach, hayati=False, noise=self.noise).delta
 
     @property
     def hayati_offset(self) -> float | None:
@@ -245,12 +238,11 @@ class PairWithReference:
         offset of the row if it can be chosen.
         """
         if not self.offset_is_free:
-            return step_between(
-                shifted_along_z(self.A, carry), self.reach, NearParallel.STRICT, phi_free, noise=self.noise
-            )
+            A = shifted_along_z(self.A, carry)
+            return step_between(A, self.reach, phi_free, hayati=False, noise=self.noise)
         A = shifted_along_z(self.A, carry - d)
         if tilt_of(A) <= self.noise.radians:
-            step = step_between(A, self.reach, self.near_parallel, phi_free, noise=self.noise)
+            step = step_between(A, self.reach, phi_free, hayati=self.hayati, noise=self.noise)
         else:
             step = hayati_step(A, self.reach, self.noise, phi_free)
         return replace(step, delta=step.delta + d) if d else step

@@ -8,15 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import TypeVar
 
 import numpy as np
 
 from urdfkin.dh.common_normals import (
     NEARLY_PARALLEL,
     AxisTransform,
-    NearParallel,
     PairWithReference,
     PoseTolerance,
     cleaned_length,
@@ -47,64 +44,39 @@ from urdfkin.model.tree import FloatArray
 RIGHT_ANGLE_SLACK = 1e-3
 
 
-class Last(StrEnum):
-    """Whether the last row ends at the tip (if four parameters suffice) or at the flange."""
-
-    TIP = "tip"
-    FLANGE = "flange"
-
-
-class First(StrEnum):
-    """Frame from which d_1 and theta_1 begin: the base, or the first joint (then both cells are 0)."""
-
-    BASE = "base"
-    JOINT = "joint"
-
-
-class Sign(StrEnum):
-    """Rule for the direction of x: |theta| is at most a right angle, or a or alpha is not negative."""
-
-    THETA = "theta"
-    A = "a"
-    ALPHA = "alpha"
-
-
-class Slide(StrEnum):
-    """Position of a prismatic axis: at the joint's origin, or at the origin of a neighbouring joint."""
-
-    DRAWN = "drawn"
-    MINIMAL = "minimal"
-
-
-class ParallelOffset(StrEnum):
-    """For consecutive parallel axes: the row that contains the offset along these axes."""
-
-    LAST = "last"
-    FIRST = "first"
-    EACH = "each"
+#: Values of the options of a derivation, which `urdfkin.dh.make.dh_table` explains.
+_OPTIONS = {
+    "near_parallel": ("hayati", "strict"),
+    "last": ("tip", "flange"),
+    "parallel_offset": ("last", "first", "each"),
+    "first": ("base", "joint"),
+    "sign": ("theta", "a", "alpha"),
+    "slide": ("drawn", "minimal"),
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Choices:
+    """The options of a derivation; an unknown value raises InputError."""
+
     convention: DHConvention = DHConvention.STANDARD
-    near_parallel: NearParallel = NearParallel.HAYATI
-    last: Last = Last.TIP
-    parallel_offset: ParallelOffset = ParallelOffset.LAST
+    near_parallel: str = "hayati"
+    last: str = "tip"
+    parallel_offset: str = "last"
     flip: tuple[str, ...] = ()
-    first: First = First.BASE
-    sign: Sign = Sign.THETA
-    slide: Slide = Slide.DRAWN
+    first: str = "base"
+    sign: str = "theta"
+    slide: str = "drawn"
 
+    def __post_init__(self) -> None:
+        for name, values in _OPTIONS.items():
+            if (value := getattr(self, name)) not in values:
+                remedy = f"write {' or '.join(map(repr, values))}"
+                raise InputError(f"unknown value of `{name}`", found=repr(value), remedy=remedy)
 
-_Choice = TypeVar("_Choice", bound=StrEnum)
-
-
-def choice(kind: type[_Choice], name: str, value: str) -> _Choice:
-    try:
-        return kind(value)
-    except ValueError:
-        known = " or ".join(repr(member.value) for member in kind)
-        raise InputError(f"unknown value of `{name}`", found=repr(value), remedy=f"write {known}") from None
+    @property
+    def hayati(self) -> bool:
+        return self.near_parallel == "hayati"
 
 
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
@@ -124,7 +96,7 @@ def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> 
         steps, thetas = _steps(constants[1:-1], phi_in, carry, reach, choices, between)
     else:
         pairs = [
-            PairWithReference(A, row, reach, noise, choices.near_parallel)
+            PairWithReference(A, row, reach, noise, choices.hayati)
             for A, row, noise in zip(constants[1:-1], like.rows[:-1], between, strict=True)
         ]
         tip = _offset_for_last_row(like, constants[-1], choices, end)
@@ -138,9 +110,9 @@ def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> 
     rows.append((theta, d))
     if like is not None:
         base, rows[0] = _first_like(like.rows[0], base, rows[0])
-    if choices.parallel_offset is ParallelOffset.FIRST:
+    if choices.parallel_offset == "first":
         rows = _sum_offsets_in_first_row(rows, steps)
-    if choices.first is First.JOINT:
+    if choices.first == "joint":
         base, rows[0] = base @ along_axis(*rows[0]), (0.0, 0.0)
         _clean_rotation(base)
     return _table(chain, choices, rows, [*steps, last], base, tool)
@@ -187,7 +159,7 @@ def _place_prismatic_axes(
 ) -> None:
     """Shift the axis lines of prismatic joints; a prismatic joint defines only the direction of its axis.
 
-    - With `Slide.MINIMAL`, the line passes through the origin of a neighbouring revolute joint.
+    - With slide = "minimal", the line passes through the origin of a neighbouring revolute joint.
     - In a table without Hayati rows, a line that is nearly parallel to a neighbouring axis passes through the
       neighbouring joint's origin. Otherwise, the common normal would be far from the robot.
     - The line of a first prismatic joint passes through the base's origin, so that the base can be the
@@ -198,15 +170,15 @@ def _place_prismatic_axes(
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)
     shifted = set[int]()
-    if choices.slide is Slide.MINIMAL:
+    if choices.slide == "minimal":
         shifted |= {k for k in prismatic if _shift_to_revolute_joint(constants, k, is_prismatic)}
-    if choices.near_parallel is NearParallel.STRICT:
+    if not choices.hayati:
         shifted |= {k for k in prismatic if k not in shifted and _shift_to_parallel_axis(constants, k, noise)}
     if 0 in prismatic and 0 not in shifted:
         _shift_to_previous_origin(constants, 0)
         shifted.add(0)
     last, tip = len(is_prismatic) - 1, constants[-1]
-    shift_avoids_tool = choices.last is Last.TIP and abs(tip[2, 0]) <= noise[-1].radians
+    shift_avoids_tool = choices.last == "tip" and abs(tip[2, 0]) <= noise[-1].radians
     has_tool = not _representable(tip, choices, noise[-1])
     if last in prismatic and last not in shifted and shift_avoids_tool and has_tool:
         _shift(constants, last, np.array([tip[0, 3], tip[1, 3], 0.0]))
@@ -286,11 +258,13 @@ def _steps(
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
     """Return the transforms between consecutive axes, and theta of each row."""
-    # `ParallelOffset.FIRST` also begins with each offset in its own row; `_sum_offsets_in_first_row` follows.
-    each = choices.parallel_offset is not ParallelOffset.LAST
+    # The option "first" also begins with each offset in its own row; `_sum_offsets_in_first_row` follows.
+    each = choices.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
-        step = step_between(shifted_along_z(A, carry), reach, choices.near_parallel, -phi_in, each, rounding)
+        step = step_between(
+            shifted_along_z(A, carry), reach, -phi_in, hayati=choices.hayati, delta_each=each, noise=rounding
+        )
         theta = cleaned_angle(phi_in + step.phi)
         if _needs_reversal(step, theta, choices.sign):
             step = step.with_reversed_x()
@@ -347,20 +321,20 @@ def _last_like(
     return row.theta, offset, AxisTransform(a=row.a, alpha=row.alpha), tool
 
 
-def _needs_reversal(step: AxisTransform, theta: float, sign: Sign) -> bool:
+def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
     """Whether the rule `sign` requires the opposite direction of x.
 
     If the cell a or alpha that the rule names is 0 (or alpha is pi), the other cell must not be negative.
     """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
-    if sign is Sign.THETA or (not step.a and not by_alpha):
+    if sign == "theta" or (not step.a and not by_alpha):
         return abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK
-    return (step.a or by_alpha) < 0.0 if sign is Sign.A else (by_alpha or step.a) < 0.0
+    return (step.a or by_alpha) < 0.0 if sign == "a" else (by_alpha or step.a) < 0.0
 
 
 def _representable(A: FloatArray, choices: Choices, noise: PoseTolerance) -> bool:
     """Whether A is a product Rz Tz Tx Rx (standard) or Rz Tz (modified), so that no tool is needed."""
-    if choices.last is Last.FLANGE:
+    if choices.last == "flange":
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
     if choices.convention is DHConvention.MODIFIED:
@@ -382,7 +356,7 @@ def _last(
         alpha = cleaned_angle(math.atan2(A[2, 1], A[2, 2]))
         step = AxisTransform(a=a, alpha=alpha)
         return cleaned_angle(phi_in + phi), cleaned_length(A[2, 3], reach, noise.metres), step, np.eye(4)
-    d = cleaned_length(carry if choices.last is Last.FLANGE else A[2, 3], reach, noise.metres)
+    d = cleaned_length(carry if choices.last == "flange" else A[2, 3], reach, noise.metres)
     tool = A.copy()
     tool[2, 3] -= d
     if phi_in:

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.common_normals import NearParallel, check_lengths
+from urdfkin.dh.common_normals import check_lengths
 from urdfkin.dh.compare.agreement import check_joints
 from urdfkin.dh.compare.signs import align
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.derive import Choices, First, Last, ParallelOffset, Sign, Slide, choice, derive
+from urdfkin.dh.derive import Choices, derive
 from urdfkin.dh.snapping import check_tolerance, row_of_constant, snap_chain, snap_report, snap_thetas
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference, convention_of
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
@@ -159,13 +159,13 @@ def dh_table(
             raise UnknownNameError("joint", name, names, where=f"path {exact.base} to {exact.tip}")
     choices = Choices(
         convention_of(convention),
-        choice(NearParallel, "near_parallel", near_parallel),
-        choice(Last, "last", last),
-        choice(ParallelOffset, "parallel_offset", parallel_offset),
+        near_parallel,
+        last,
+        parallel_offset,
         tuple(flip),
-        choice(First, "first", first),
-        choice(Sign, "sign", sign),
-        choice(Slide, "slide", slide),
+        first,
+        sign,
+        slide,
     )
     if like is not None:
         choices = replace(choices, flip=reversed_like(exact, choices, like))

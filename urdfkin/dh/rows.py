@@ -445,7 +445,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
                 "a joint cannot mimic a mimic joint",
                 where=where,
                 found=repr(row.mimic.leader),
-                remedy="name the joint that the mimicked joint itself mimics, and multiply both multipliers",
+                remedy=f"name the joint that {row.mimic.leader!r} mimics; multiply the multipliers",
             )
         error = UnknownNameError("joint", row.mimic.leader, known, where=where)
         error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"

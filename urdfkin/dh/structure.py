@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.derive import Choices, Last, derive
+from urdfkin.dh.derive import Choices, derive
 from urdfkin.dh.make import derive_like, reversed_like
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.snapping import travel
@@ -368,18 +368,18 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
     """Yield OPW tables with the approximate lengths of the arm, for all signs of a1, a2 and b."""
-    rows = derive(path, Choices(last=Last.FLANGE)).rows
+    rows = derive(path, Choices(last="flange")).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
     b = abs(rows[1].d) + abs(rows[2].d)
     for one, two, three in product((1.0, -1.0), repeat=3):
         a = (one * a1, c2, two * a2, 0.0, 0.0, 0.0)
         d = (abs(rows[0].d) or 1.0, 0.0, three * b, abs(rows[3].d), 0.0, tip)
-        table = (
+        opw_rows = (
             DHRow(a[i], _ALPHA[i], d[i], _THETA[i], JointKind.REVOLUTE, joint.name)
             for i, joint in enumerate(path.joints)
         )
-        yield DHTable(DHConvention.STANDARD, tuple(table))
+        yield DHTable(DHConvention.STANDARD, tuple(opw_rows))
 
 
 def _parameters(table: DHTable) -> Opw:

@@ -19,7 +19,7 @@ import numpy as np
 from urdfkin.dh.compare.agreement import compare, fast_fit_errors
 from urdfkin.dh.compare.result import TableComparison
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.derive import Choices, Last, derive
+from urdfkin.dh.derive import Choices, derive
 from urdfkin.dh.rows import by_column, table_from_mapping
 from urdfkin.dh.table import DHConvention, DHTable, convention_of, looks_round
 from urdfkin.dh.units import COLUMNS, Angles, Lengths, units_of
@@ -84,7 +84,7 @@ def diagnose(
     the returned interpretation, the tip error is at most 5 % of `stated_error`, or within `tolerance`.
     """
     kinds = [joint.kind.turns for joint in chain.joints]
-    shape_of_urdf = shape(derive(chain, Choices(last=Last.FLANGE)), chain.reach)
+    shape_of_urdf = shape(derive(chain, Choices(last="flange")), chain.reach)
     try:
         stated = stated_interpretation(data)
     except InputError:  # Another function reports this error.

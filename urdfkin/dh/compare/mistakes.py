@@ -40,7 +40,7 @@ _MOST_FITS = 100
 
 
 @dataclass(frozen=True, slots=True)
-class _Correction:
+class _TableCorrection:
     """A table in which one possible mistake is corrected; `cell` is None if the correction exchanges rows."""
 
     kind: MistakeKind
@@ -157,7 +157,7 @@ class MistakeSearch:
         reversed_ = int((model.senses != written.senses).sum())
         return Fitted(base, tool, int((zeros > fine).sum()), reversed_)
 
-    def _mistake(self, reference: DHTable, correction: _Correction, model: TableArrays) -> Mistake:
+    def _mistake(self, reference: DHTable, correction: _TableCorrection, model: TableArrays) -> Mistake:
         metres, radians = self.check_targets.largest_errors(model)
         tables, cell = (reference, correction.table), None
         if correction.cell is not None:
@@ -174,18 +174,18 @@ def _model(table: DHTable) -> TableArrays:
     return TableArrays.of(to_convention(table, DHConvention.STANDARD))
 
 
-def _corrections(reference: DHTable) -> Iterator[_Correction]:
+def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
     for i, row in enumerate(reference.rows):
         for cell in COLUMNS:
             value = getattr(row, cell)
             if abs(math.sin(value) if cell in ("alpha", "theta") else value) > _SAME_ANGLE:
-                yield _Correction(MistakeKind.SIGN, (i,), cell, _with_cell(reference, i, cell, -value))
+                yield _TableCorrection(MistakeKind.SIGN, (i,), cell, _with_cell(reference, i, cell, -value))
         for right_angle in (-0.5 * math.pi, 0.5 * math.pi):
             value = math.remainder(row.alpha + right_angle, 2.0 * math.pi)
             is_opposite_sign = abs(angle_difference(value, -row.alpha)) <= _SAME_ANGLE
             if not is_opposite_sign:
                 table = _with_cell(reference, i, "alpha", value)
-                yield _Correction(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)
+                yield _TableCorrection(MistakeKind.RIGHT_ANGLE, (i,), "alpha", table)
     orders = list[tuple[MistakeKind, tuple[int, ...], list[DHRow]]]()
     for i, j in combinations(range(len(reference.rows)), 2):
         rows = list(reference.rows)
@@ -197,7 +197,7 @@ def _corrections(reference: DHTable) -> Iterator[_Correction]:
     for kind, indices, rows in orders:
         same_kinds = [row.kind.turns for row in rows] == [row.kind.turns for row in reference.rows]
         if same_kinds and any(_numbers(rows[i]) != _numbers(reference.rows[i]) for i in indices):
-            yield _Correction(kind, indices, None, replace(reference, rows=tuple(rows)))
+            yield _TableCorrection(kind, indices, None, replace(reference, rows=tuple(rows)))
 
 
 def _numbers(row: DHRow) -> tuple[float, ...]:

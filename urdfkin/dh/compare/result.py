@@ -241,7 +241,7 @@ def _fitted(found: TableComparison, units: Units) -> Parts:
         if sense < 0 or abs(offset) > fine
     ]
     if variables:
-        parts += ["", "Joint variables of the table in terms of those of the URDF:", *variables]
+        parts += ["", "Joint variables of the table (q is the URDF's joint value):", *variables]
     for what, T in (("base", table.base), ("tool", table.tool)):
         rounded = np.round(T / fine) * fine
         if np.abs(rounded - np.eye(4)).max() > fine:
@@ -255,7 +255,7 @@ def _verdict(found: TableComparison) -> list[str]:
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
     verdict = agrees if found.agrees else "DIFFERS"
     error = _tip_error(found.metres, found.radians)
-    proof = f"{found.samples} samples; proven for all values of the joints: {_proven(found)}"
+    proof = f"{found.samples} samples; proven bound for all joint values: {_proven(found)}"
     if found.as_written:
         return [f"The table {verdict} without a fit: {path}: {error}", f"({proof})."]
     if not found.fitted:
@@ -304,8 +304,8 @@ def _tip_error(metres: float, radians: float) -> str:
 
 def _proven(found: TableComparison) -> str:
     if found.exact:
-        return "rounding alone"
-    return "nothing" if math.isinf(found.most_metres) else _errors(found.most_metres, found.most_radians)
+        return "only rounding errors"
+    return "none" if math.isinf(found.most_metres) else _errors(found.most_metres, found.most_radians)
 
 
 def _mistakes(found: TableComparison, units: Units) -> list[str]:
@@ -343,8 +343,8 @@ def _cells(found: TableComparison, units: Units) -> Parts:
         parts += ["", f"Cells that differ {unit}:", _table(found.differences, units)]
         rounded = sum(one.is_rounding for one in found.differences)
         if rounded:
-            all_ = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
-            parts.append(f"{all_} differ only within the last digit of the table (*).")
+            count = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
+            parts.append(f"{count} differences are within the last digit of the table (*).")
     elif found.as_written:
         parts.append("Every cell agrees with the URDF.")
     elif found.exact:
@@ -356,7 +356,7 @@ def _cells(found: TableComparison, units: Units) -> Parts:
         same = "a change of base, tool or joint offsets has the same effect"
         parts.append(f"These cells are not compared, because {same}: {cells}.")
     if {(one.row, one.cell) for one in found.instead} - {(one.row, one.cell) for one in found.differences}:
-        parts += ["", f"Without fitting, these cells would have to change {unit}:"]
+        parts += ["", f"To agree without a fit, these cells must change {unit}:"]
         parts.append(_table(found.instead, units))
     return parts
 

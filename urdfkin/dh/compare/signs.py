@@ -19,7 +19,6 @@ from urdfkin.dh.common_normals import (
     LARGEST_HAYATI_TILT,
     NEARLY_PARALLEL,
     AxisTransform,
-    NearParallel,
     shifted_along_z,
     step_between,
     tilt_of,
@@ -46,7 +45,7 @@ _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
-class Alignment:
+class SignFit:
     """A combination of joint signs, with the joint offsets, the base and the tool that belong to these signs.
 
     Attributes:
@@ -89,7 +88,7 @@ class _PartialAlignment:
     free_offset: tuple[int, float] | None = None
 
 
-def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[Alignment]:
+def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[SignFit]:
     """Return up to `count` alignments of a path with a reference table, the closest first.
 
     The reference table must be standard and have the same kinds of joints. With prismatic joints, several
@@ -202,21 +201,21 @@ def _steps(
     sine = tilt_of(A)
     near = abs(math.sin(row.alpha)) < LARGEST_HAYATI_TILT and sine < LARGEST_HAYATI_TILT
     if not near or row.beta == 0.0:
-        steps.append(step_between(A, reach, NearParallel.STRICT, phi_free))
+        steps.append(step_between(A, reach, phi_free, hayati=False))
     if near:
         shifted = shifted_along_z(A, -delta)
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _NO_OFFSET or not both_turn:
             shifted[:2, 3] = 0.0
         # With reach 0, `step_between` makes a Hayati row for all axes that are not exactly parallel.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
-        step = step_between(shifted, hayati_reach, NearParallel.HAYATI, phi_free)
+        step = step_between(shifted, hayati_reach, phi_free, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))
     for step in steps:
         yield step
         yield replace(step.with_reversed_x(), phi_is_free=step.phi_is_free)
 
 
-def _with_tool(partial: _PartialAlignment, chain: FrameChain, reference: DHTable) -> Alignment:
+def _with_tool(partial: _PartialAlignment, chain: FrameChain, reference: DHTable) -> SignFit:
     n, last = len(reference.rows), reference.rows[-1]
     base = _constant(chain, 0, 1, partial.senses[0]) @ partial.base
     tip = _constant(chain, n, partial.senses[-1], 1)
@@ -225,4 +224,4 @@ def _with_tool(partial: _PartialAlignment, chain: FrameChain, reference: DHTable
     else:
         tip = along_axis(partial.phi_in - last.theta, partial.carry - last.d) @ tip
     tool = np.asarray(np.linalg.solve(last.X, tip), np.float64)
-    return Alignment(partial.senses, (*partial.offsets, 0.0), base, tool)
+    return SignFit(partial.senses, (*partial.offsets, 0.0), base, tool)
