@@ -184,7 +184,7 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
 
 def test_the_command_says_what_is_rounded_and_knows_no_fit(tmp_path: Path) -> None:
     done = command("dh kinova --compare kinova")
-    assert "All differ only within the last digit of the table (*)." in done.text
+    assert "All differences are within the last digit of the table (*)." in done.text
     data = json.loads(command("dh kinova --compare kinova --format json").text)
     assert [one["within_last_digit"] for one in data["differences"]] == [True]
     file = tmp_path / "wrong.toml"

@@ -79,8 +79,8 @@ FRAGMENTS = [
     ("kinematics.rotation", "return np.stack([*columns, axis]", "return -np.stack([*columns, axis]"),
     # a table's URDF
     ("model.path", "    if motion.turns:", "    if not motion.turns:"),
-    ("dh.convert", "ways = [s @ x for s, x", "ways = [x @ s for s, x"),
-    ("dh.convert", "poses[-1] @ table.tool\n", "table.tool @ poses[-1]\n"),
+    ("dh.convert", "[row.S @ row.X for", "[row.X @ row.S for"),
+    ("dh.convert", "T_last_tip @ table.tool]", "table.tool @ T_last_tip]"),
     ("urdf.writer", "numbers(rpy_of(T[:3, :3]))", "numbers(rpy_of(T[:3, :3])[::-1])"),
     ("urdf.writer", "numbers(T[:3, 3])", "numbers(T[:3, :3] @ T[:3, 3])"),
     # Pinocchio's side

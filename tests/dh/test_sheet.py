@@ -34,7 +34,7 @@ from urdfkin.dh.parse_table import (
     table_from_text,
 )
 from urdfkin.dh.rows import last_digits
-from urdfkin.dh.units import NoCellError, cell_of
+from urdfkin.dh.units import InvalidCellError, parse_cell
 from urdfkin.errors import InputError, SourceError, UrdfkinError
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot.loading import load
@@ -239,16 +239,16 @@ def test_what_is_no_table_says_where(text: str, message: str) -> None:
     "text", ["", "1_0", "nan", "1 2", "--1", "1/0", "q1 + q2", "pi deg", "3 *", "* 3", "٣", "1e999"]
 )
 def test_what_is_no_cell_is_refused(text: str) -> None:
-    with pytest.raises(NoCellError):
-        cell_of(text)
+    with pytest.raises(InvalidCellError):
+        parse_cell(text)
 
 
 @pytest.mark.slow
 @given(st.text(max_size=30))
 @settings(max_examples=300)
 def test_any_text_is_a_cell_or_is_refused(text: str) -> None:
-    with contextlib.suppress(NoCellError):
-        assert math.isfinite(cell_of(text).number)
+    with contextlib.suppress(InvalidCellError):
+        assert math.isfinite(parse_cell(text).number)
 
 
 def test_the_last_digit_of_a_cell_with_a_unit_is_known() -> None:

@@ -16,9 +16,9 @@ from tests.dh.test_compare import elbow
 from tests.reading import present
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
 from urdfkin.dh.compare import TOLERANCE, diagnose
-from urdfkin.dh.compare.slips import as_said, doubts, other_readings
+from urdfkin.dh.compare.hypotheses import other_interpretations, stated_interpretation, table_warnings
 from urdfkin.dh.parse_table import reference_path
-from urdfkin.dh.rows import ORDER
+from urdfkin.dh.units import COLUMNS
 from urdfkin.model.chain import chain
 from urdfkin.robot.loading import load
 from urdfkin.urdf.findings import UrdfWarning
@@ -30,12 +30,12 @@ CRAIG = ("alpha", "a", "d", "theta")
 
 
 def written(
-    table: DHTable, convention: str, columns: tuple[str, ...] = ORDER, mm: bool = False, deg: bool = False
+    table: DHTable, convention: str, columns: tuple[str, ...] = COLUMNS, mm: bool = False, deg: bool = False
 ) -> dict[str, Any]:
     """The table's cells as somebody writes them who says nothing but a convention, perhaps the wrong one."""
     rows = []
     for row in table.rows:
-        cells: dict[str, Any] = {name: getattr(row, name) for name in ORDER}
+        cells: dict[str, Any] = {name: getattr(row, name) for name in COLUMNS}
         if mm:
             cells |= {name: cells[name] * 1e3 for name in ("a", "d")}
         if deg:
@@ -65,16 +65,16 @@ def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) ->
     options, words = SLIPS[slip]
     wrong = "modified" if str(reference.convention) == "standard" else "standard"
     found = present(diagnose(path, written(reference, wrong, **options), TOLERANCE))
-    assert found.reading.words(found.said).startswith(words.format(reference.convention))
+    assert found.interpretation.differences(found.stated).startswith(words.format(reference.convention))
     assert found.metres <= 5.01e-5
-    assert found.reading.slips(found.said) <= 4
+    assert found.interpretation.difference_count(found.stated) <= 4
 
 
 @pytest.mark.parametrize("kinds", ["RRPRRR", "PRRRRR"])
 def test_a_slip_is_named_where_a_joint_slides(kinds: str) -> None:
     tree = elbow(kinds)
     found = present(diagnose(chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6))
-    assert found.reading.words(found.said) == "millimetres"
+    assert found.interpretation.differences(found.stated) == "millimetres"
 
 
 @pytest.mark.slow
@@ -87,12 +87,15 @@ def test_another_robots_table_fits_in_no_reading() -> None:
 
 @pytest.mark.parametrize("rows", [None, 3, ["abc"], [3.0]])
 def test_what_is_no_table_has_no_reading(rows: Any) -> None:
-    assert list(other_readings({"convention": "standard", "rows": rows})) == []
+    assert list(other_interpretations({"convention": "standard", "rows": rows})) == []
 
 
 def test_the_fewest_slips_are_tried_first() -> None:
     data = written(dh_table(elbow(), "tip"), "standard")
-    counts = [reading.slips(as_said(data)) for reading, _ in other_readings(data)]
+    counts = [
+        interpretation.difference_count(stated_interpretation(data))
+        for interpretation, _ in other_interpretations(data)
+    ]
     assert counts == sorted(counts)
     assert counts[0] == 1
 
@@ -117,12 +120,14 @@ def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> No
 
 def test_a_table_alone_is_doubted_only_where_it_cannot_be_meant() -> None:
     deg = {"angles": "degrees"}
-    assert "look like radians" in doubts(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
-    assert "look like metres" in doubts(table_from_rows([[0.4, 0, 0, 0]], "standard", lengths="mm"))[0]
+    assert "look like radians" in table_warnings(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
+    assert (
+        "look like metres" in table_warnings(table_from_rows([[0.4, 0, 0, 0]], "standard", lengths="mm"))[0]
+    )
     exchanged = [{"a": 1.5708, "alpha": 0.4}, {"a": -1.5708, "alpha": 0.3}]
-    assert "a and alpha look exchanged" in doubts(table_from_rows(exchanged, "standard"))[0]
+    assert "a and alpha look exchanged" in table_warnings(table_from_rows(exchanged, "standard"))[0]
     for name in ("kinova", "panda", "ur3", "ur5", "ur10", "xarm7_modified", "xarm7_standard"):
-        assert doubts(read_table(reference_path(name))) == []
+        assert table_warnings(read_table(reference_path(name))) == []
 
 
 def test_load_warns_of_a_table_in_millimetres() -> None:

@@ -161,7 +161,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.dh.export.toolboxes import screws_document, write_screws
+    from urdfkin.dh.export.toolboxes import write_screws
+    from urdfkin.dh.screws import screws_document
     from urdfkin.verify.chain_checks import check_screws
 
     loaded = load_robot(robot, verify=verify)

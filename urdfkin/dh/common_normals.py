@@ -1,42 +1,19 @@
-"""Compute the common normal of two consecutive joint axes, and handle axes without a unique common normal.
+"""Compute the transform between two consecutive joint axes, along their common normal if it is unique.
 
-The z axis of each joint frame points along the joint's axis. Let A be the constant pose of the next joint's
-frame in this joint's frame. `step_between` writes A as a product:
+The z axis of each joint frame is the joint's axis. Let A be the constant pose of the next joint's frame in
+this joint's frame. `step_between` writes A as a product:
 
     A = Rz(phi) Tz(delta) . Tx(a) Rx(alpha) Ry(beta) . Rz(phi_next) Tz(delta_next)
 
-The factors Rz(phi) and Tz(delta) commute with the motion of the first joint, so they belong to the first
-joint's row. The factors Rz(phi_next) and Tz(delta_next) commute with the motion of the second joint, so they
-belong to the second joint's row. For two skew axes, beta is 0. The other six numbers are then unique, except
-that the direction of x can be reversed (Denavit and Hartenberg). The number a is the distance between the two
-joint axes. The offset delta is measured along the first axis, from the origin of the first joint frame to the
-common normal. The offset delta_next is measured along the second axis, from the common normal to the origin
-of the second joint frame. Parallel axes have many common normals. The common normal of nearly parallel axes
-can be very far from the robot. docs/dh.md explains how urdfkin chooses the numbers in these two cases.
+Rz(phi) and Tz(delta) commute with the motion of the first joint, so they are part of the first joint's row.
+Rz(phi_next) and Tz(delta_next) commute with the motion of the second joint, so they are part of the second
+joint's row. For skew axes, beta is 0, and the other six numbers are unique except for the direction of x
+(Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
-The author of a table can choose the offsets along parallel axes and the directions of the x axes.
-`steps_like` makes the same choices as another table. If several axes are parallel, the pose of the tip
-determines only the sum of their offsets d. If several axes coincide, the pose of the tip determines only the
-sum of their angles theta. For such axes, urdfkin copies d or theta from the other table, except in one row.
-In that row, urdfkin computes d or theta so that the sum is correct. If that row is the first row, urdfkin can
-change the base instead.
-
-Two parallel axes do not determine the offset d of their row. The two axes of a Hayati row do not determine d
-of this row. In both cases, d can be chosen, and the offset of the next row compensates the choice. The x axis
-of a Hayati row lies in a plane normal to the joint's axis, and d shifts this plane. Therefore, urdfkin
-computes the d of a row before the later rows.
-
-**Noise.** Two correct programs read the same URDF and compute slightly different constant poses between two
-joint axes. The program that wrote the file may also have rounded each angle to fifteen digits.
-`urdfkin.kinematics.roundings` takes both effects into account. Angles that are written with fourteen or
-fifteen digits are therefore treated as round. For example, 1.5707963267949 and 3.14159265358979 differ by 15
-eps from a multiple of a right angle, where eps is the machine epsilon. An angle that is written with twelve
-digits differs from the multiple by 900 eps or more, and is not treated as round. The option `snap` replaces
-such an angle by the nearest multiple of 15 degrees and reports the effect.
-
-If the tilt between two axes is below the noise, urdfkin treats the two axes as parallel. The table then
-contains zero instead of the tilt. Otherwise, the common normal could be very far from the robot. `left_out`
-returns the sum of these tilts. The orientation error that these tilts cause is at most this sum.
+`steps_like` makes the free choices of another table. The pose of the tip determines only the sum of the
+offsets d along parallel axes, and only the sum of the angles theta about coinciding axes. In all rows of such
+axes except one, `steps_like` copies d or theta from the other table. The remaining row makes the sum correct.
+The two axes of a Hayati row do not determine d of this row either.
 """
 
 from __future__ import annotations
@@ -44,138 +21,123 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
-from urdfkin.dh.table import DHRow, DHTable, between_axes, nearest_twelfth, wrapped
+from urdfkin.dh.table import DHRow, DHTable, angle_difference, between_axes, cleaned_angle
 from urdfkin.errors import RangeError
 from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUMMED, WRITTEN
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Two axes with a smaller tilt (rad) are nearly parallel.
-#: An error of a number in the URDF then moves their common normal by more than 100 times the error.
+#: Tilt (rad) below which two axes are nearly parallel.
+#: Below this tilt, an error in the URDF moves the common normal by more than 100 times the error.
 NEARLY_PARALLEL = 1e-2
 
-#: Two axes with a larger tilt (rad) are never treated as nearly parallel.
-#: From `NEARLY_PARALLEL` to this tilt, axes are nearly parallel only if their common normal is far away.
-FAR_FEET = 0.35
-
-
-class NearParallel(StrEnum):
-    """Kind of row for two nearly parallel axes: a Hayati row, or a row of four parameters."""
-
-    HAYATI = "hayati"
-    STRICT = "strict"
+#: Largest tilt (rad) of nearly parallel axes.
+#: Axes with a tilt above `NEARLY_PARALLEL` are nearly parallel only if their common normal is far away.
+LARGEST_HAYATI_TILT = 0.35
 
 
 @dataclass(frozen=True, slots=True)
 class AxisTransform:
     """The seven numbers of the transform between two joint axes, in metres and radians.
 
-    Attributes:
-        free: Whether `phi` was a free choice because the axes coincide.
+    Coinciding axes do not determine phi; `phi_is_free` is then True.
     """
 
-    phi: float
-    delta: float
-    a: float
-    alpha: float
-    beta: float
-    phi_next: float
-    delta_next: float
-    free: bool = False
+    phi: float = 0.0
+    delta: float = 0.0
+    a: float = 0.0
+    alpha: float = 0.0
+    beta: float = 0.0
+    phi_next: float = 0.0
+    delta_next: float = 0.0
+    phi_is_free: bool = False
 
-    def turned(self) -> AxisTransform:
-        """Return the numbers for the same two axes and the opposite direction of x."""
-        alpha = math.pi if self.alpha == math.pi else -self.alpha
-        phi, phi_next = self.phi + math.pi, self.phi_next - math.pi
-        return replace(self, phi=phi, a=-self.a, alpha=alpha, beta=-self.beta, phi_next=phi_next, free=False)
+    def with_reversed_x(self) -> AxisTransform:
+        return AxisTransform(
+            phi=self.phi + math.pi,
+            delta=self.delta,
+            a=-self.a,
+            alpha=math.pi if self.alpha == math.pi else -self.alpha,
+            beta=-self.beta,
+            phi_next=self.phi_next - math.pi,
+            delta_next=self.delta_next,
+        )
 
 
-def lifted(A: FloatArray, carry: float) -> FloatArray:
-    """Return Tz(carry) A: convert a pose in the joint's frame to a pose in the DH frame."""
-    raised = A.copy()
-    raised[2, 3] += carry
-    return raised
+def shifted_along_z(A: FloatArray, distance: float) -> FloatArray:
+    """Return Tz(distance) A."""
+    shifted = A.copy()
+    shifted[2, 3] += distance
+    return shifted
 
 
 def step_between(
     A: FloatArray,
     reach: float,
-    near_parallel: NearParallel,
     phi_free: float = 0.0,
+    *,
+    hayati: bool,
     delta_each: bool = False,
     noise: PoseTolerance | None = None,
 ) -> AxisTransform:
-    """Factor the constant pose between two joint axes into the seven numbers of a `AxisTransform`.
+    """Factor the constant pose between two joint axes into the seven numbers of an `AxisTransform`.
 
     Args:
         A: (4, 4) pose of the next joint's frame in this joint's frame.
-        reach: Length in metres. If the common normal is farther from a joint frame than `reach`, a Hayati row
-            is possible.
-        near_parallel: Kind of row for nearly parallel axes.
+        reach: Length of the path (metres). A common normal is far away if its distance from a joint frame
+            exceeds `reach`.
         phi_free: Value of phi for coinciding axes, for which every phi is correct.
+        hayati: Whether nearly parallel axes get a Hayati row instead of a row of four parameters.
         delta_each: For parallel axes: True if `delta` contains the offset, False if `delta_next` contains it.
         noise: Limits for tilts and lengths; smaller values are set to zero. None: the limits for the origin
             of a single URDF joint.
     """
-    noise = noise or noise_of(1, 0.0, reach)
+    noise = noise or pose_tolerance(1, 0.0, reach)
     sine = tilt_of(A)
     if sine <= noise.radians:
         return _parallel(A, reach, noise, phi_free, delta_each)
-    feet = _skew(A, sine, reach, noise)
-    if near_parallel is NearParallel.HAYATI and _is_near(feet, sine, reach):
+    step = _along_common_normal(A, sine, reach, noise)
+    is_far = max(abs(step.delta), abs(step.delta_next)) > reach
+    is_near_parallel = sine < NEARLY_PARALLEL or (sine < LARGEST_HAYATI_TILT and is_far)
+    if hayati and is_near_parallel:
         return hayati_step(A, reach, noise, phi_free)
-    return feet
+    return step
 
 
-def _is_near(feet: AxisTransform, sine: float, reach: float) -> bool:
-    far = max(abs(feet.delta), abs(feet.delta_next)) > reach
-    return sine < NEARLY_PARALLEL or (sine < FAR_FEET and far)
-
-
-def _skew(A: FloatArray, sine: float, reach: float, noise: PoseTolerance) -> AxisTransform:
-    """Return the numbers of the transform between two skew axes.
-
-    The x axis points along the cross product of z and z_next. The length a is positive, or 0 if the axes
-    intersect.
-    """
+def _along_common_normal(A: FloatArray, sine: float, reach: float, noise: PoseTolerance) -> AxisTransform:
+    """Return the transform between two axes that are not parallel; x is along z cross z_next, and a >= 0."""
     phi = math.atan2(A[0, 2], -A[1, 2])
     along = math.cos(phi) * A[0, 3] + math.sin(phi) * A[1, 3]
     across = math.cos(phi) * A[1, 3] - math.sin(phi) * A[0, 3]
     delta_next = cleaned_length(-across / sine, reach, noise.metres)
     delta = cleaned_length(A[2, 3] - delta_next * A[2, 2], reach, noise.metres)
     a, alpha = cleaned_length(along, reach, noise.metres), cleaned_angle(math.atan2(sine, A[2, 2]))
-    step = AxisTransform(phi, delta, a, alpha, 0.0, _remaining_rotation(A, phi, alpha, 0.0), delta_next)
-    return step.turned() if a < 0.0 else step
+    step = AxisTransform(phi, delta, a, alpha, 0.0, _phi_next(A, phi, alpha, 0.0), delta_next)
+    return step.with_reversed_x() if a < 0.0 else step
 
 
 def _parallel(
     A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float, delta_each: bool
 ) -> AxisTransform:
-    """Return the numbers of the transform between two parallel axes.
-
-    The x axis is along the perpendicular through the origin of this joint's frame. If the axes coincide, they
-    do not determine phi, and the function sets phi to `phi_free`.
-    """
+    """Return the transform between two parallel axes, along the normal through this joint's origin."""
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
     offset = cleaned_length(A[2, 3], reach, noise.metres)
     delta, delta_next = (offset, 0.0) if delta_each else (0.0, sign * offset)
     a = cleaned_length(math.hypot(A[0, 3], A[1, 3]), reach, noise.metres)
     phi = math.atan2(A[1, 3], A[0, 3]) if a else phi_free
-    return AxisTransform(
-        phi, delta, a, alpha, 0.0, _remaining_rotation(A, phi, alpha, 0.0), delta_next, free=not a
-    )
+    phi_next = _phi_next(A, phi, alpha, 0.0)
+    return AxisTransform(phi, delta, a, alpha, 0.0, phi_next, delta_next, phi_is_free=not a)
 
 
 def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float) -> AxisTransform:
-    """Return the numbers of the transform between two axes for a Hayati row (Hayati, 1983).
+    """Return the transform between two axes for a Hayati row (Hayati, 1983).
 
-    Consider the plane through the origin of this joint's frame, normal to this joint's axis. The x axis
-    points from the origin to the intersection of this plane with the next axis.
+    The next axis intersects the xy plane of this joint's frame in a point. The x axis of the row leads from
+    the origin to this point.
     """
     z = A[:3, 2]
     delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)
@@ -186,24 +148,22 @@ def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: flo
     y = math.cos(phi) * z[1] - math.sin(phi) * z[0]
     alpha = cleaned_angle(math.atan2(-y, z[2]))
     beta = cleaned_angle(math.atan2(x, math.hypot(y, z[2])))
-    return AxisTransform(
-        phi, 0.0, a, alpha, beta, _remaining_rotation(A, phi, alpha, beta), delta_next, free=not a
-    )
+    phi_next = _phi_next(A, phi, alpha, beta)
+    return AxisTransform(phi, 0.0, a, alpha, beta, phi_next, delta_next, phi_is_free=not a)
 
 
-def _remaining_rotation(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
-    """Return phi_next (rad) by a formula that is accurate for every tilt."""
-    turn_phi = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
-    M = (turn_phi @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
+def _phi_next(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
+    """Return the remaining rotation of A about the next axis (rad), accurately for every tilt."""
+    Rz = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
+    M = (Rz @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
 
 
 def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
-    """Return a length (metres) without rounding noise.
+    """Return a length (metres) without the rounding error of numbers of the size `reach`.
 
-    `reach` is the magnitude of the numbers from which the length was computed. If the length is below `noise`
-    or the rounding error of `reach`, the function returns 0. If the length differs from a decimal number of
-    twelve digits only by rounding error, the function returns the decimal number.
+    A length is replaced by 0 if it is at most `noise` or this rounding error. A length that differs from a
+    decimal number of twelve digits only by this rounding error is replaced by the decimal number.
 
         >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
         (0.0, 0.076, -5e-12)
@@ -214,178 +174,146 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
     return short if abs(length - short) <= DIGITS * EPS * reach else float(length)
 
 
-def cleaned_angle(angle: float) -> float:
-    """Return the angle in (-pi, pi]; within rounding error of a multiple of pi/12, return this multiple."""
-    angle = wrapped(angle)
-    twelfth = nearest_twelfth(angle)
-    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
-
-
 @dataclass(frozen=True, slots=True)
-class PairLike:
-    """Two consecutive joint axes of a path, with the corresponding row of another table.
+class PairWithReference:
+    """Two consecutive joint axes of a path, and the first joint's row in another table (the reference).
 
-    Attributes:
-        A: (4, 4) pose of the next joint's frame in this joint's frame.
-        row: The other table's row.
-        reach: Metres; see `cleaned_length`.
-        noise: Noise of the pose.
+    `A` is the (4, 4) pose of the next joint's frame in this joint's frame.
     """
 
     A: FloatArray
     row: DHRow
     reach: float
     noise: PoseTolerance
-    near_parallel: NearParallel
+    hayati: bool
 
     @property
-    def slides(self) -> bool:
+    def is_prismatic(self) -> bool:
         return not self.row.kind.turns
 
     @property
-    def passes_on(self) -> bool:
-        """Whether the two axes do not determine the row's offset d.
-
-        In this case, d can be chosen, and the offset of the next row compensates the choice.
-        """
-        return tilt_of(self.A) <= self.noise.radians or self._gets_hayati_row
+    def offset_is_free(self) -> bool:
+        """Whether the offset d of the row can be chosen, so that the next row compensates the choice."""
+        return tilt_of(self.A) <= self.noise.radians or self._has_hayati_row
 
     @property
-    def _gets_hayati_row(self) -> bool:
-        """Whether the table has a Hayati row for these two axes.
-
-        If a row of four parameters is possible too, urdfkin uses the kind of row that the other table has.
-        """
+    def _has_hayati_row(self) -> bool:
+        """Whether the two axes get a Hayati row: always for a small tilt, else as in the reference."""
         sine = tilt_of(self.A)
-        leans_there = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
-        return self.near_parallel is NearParallel.HAYATI and (
-            sine < NEARLY_PARALLEL or (sine < FAR_FEET and not leans_there)
+        reference_is_strict = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
+        return self.hayati and (
+            sine < NEARLY_PARALLEL or (sine < LARGEST_HAYATI_TILT and not reference_is_strict)
         )
 
     @property
-    def foot(self) -> float:
+    def normal_offset(self) -> float:
         """Distance (metres) along the first axis, from the frame of its joint to the common normal."""
-        return step_between(self.A, self.reach, NearParallel.STRICT, noise=self.noise).delta
+        return step_between(self.A, self.reach, hayati=False, noise=self.noise).delta
 
     @property
-    def cut(self) -> float | None:
-        """Distance (metres) along the first axis from the joint's frame to the x axis of the Hayati row.
+    def hayati_offset(self) -> float | None:
+        """Distance (metres) along the first axis from the joint's frame to the x axis of a Hayati row.
 
-        This x axis lies in a plane normal to the first axis. The next axis intersects the plane in a point.
-        In the other table, the cell a is the distance of this point from the first axis. The component of a
-        in the direction of the tilt determines the position of the plane. The position error is then the
-        rounding error divided by the tilt. For a slight tilt, urdfkin computes this component from a and from
-        the component normal to the tilt, which is more accurate. The result is None if the plane is farther
-        away than `reach`.
+        The offset is chosen so that the cell a has the same component along the tilt as in the reference. A
+        small tilt determines this component only inaccurately. The component is then computed from the whole
+        cell a and from its component normal to the tilt. The result is None beyond `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
-        sine, lean = tilt_of(self.A), math.hypot(along, across)
-        if min(sine, lean) <= self.noise.radians:
+        sine, reference_tilt = tilt_of(self.A), math.hypot(along, across)
+        if min(sine, reference_tilt) <= self.noise.radians:
             return None
         (x, y, z), p = self.A[:3, 2] / sine, self.A[:3, 3]
-        there = self.row.a * along / lean
-        beside = p[0] * y - p[1] * x
-        if sine * sine <= self.noise.radians and self.row.a**2 * sine < abs(there * beside):
-            there = math.copysign(math.sqrt(max(0.0, self.row.a**2 - beside**2)), there)
-        cut = float(p[2] + (there - p[0] * x - p[1] * y) * z)
-        return cut if abs(cut) <= self.reach else None
+        a_along_tilt = self.row.a * along / reference_tilt
+        a_across_tilt = p[0] * y - p[1] * x
+        if sine * sine <= self.noise.radians and self.row.a**2 * sine < abs(a_along_tilt * a_across_tilt):
+            square = self.row.a**2 - a_across_tilt**2
+            a_along_tilt = math.copysign(math.sqrt(max(0.0, square)), a_along_tilt)
+        offset = float(p[2] + (a_along_tilt - p[0] * x - p[1] * y) * z)
+        return offset if abs(offset) <= self.reach else None
 
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> AxisTransform:
-        """Return the numbers of the transform between the two axes.
+        """Return the transform between the two axes.
 
         `carry` is the offset (metres) along the first axis from the DH frame to the joint's frame. `d` is the
-        row's offset, which is used only if the two axes do not determine it.
+        offset of the row if it can be chosen.
         """
-        if not self.passes_on:
-            return step_between(
-                lifted(self.A, carry), self.reach, NearParallel.STRICT, phi_free, noise=self.noise
-            )
-        A = lifted(self.A, carry - d)
+        if not self.offset_is_free:
+            A = shifted_along_z(self.A, carry)
+            return step_between(A, self.reach, phi_free, hayati=False, noise=self.noise)
+        A = shifted_along_z(self.A, carry - d)
         if tilt_of(A) <= self.noise.radians:
-            step = step_between(A, self.reach, self.near_parallel, phi_free, noise=self.noise)
+            step = step_between(A, self.reach, phi_free, hayati=self.hayati, noise=self.noise)
         else:
             step = hayati_step(A, self.reach, self.noise, phi_free)
         return replace(step, delta=step.delta + d) if d else step
 
-    def passed_back(self, carry: float) -> float:
-        """Return the offset (metres) from this joint's DH frame to this joint's frame, for a row with d = 0.
-
-        `carry` is the offset from the next joint's DH frame to the next joint's frame.
-        """
+    def offset_before(self, carry: float) -> float:
+        """Convert the next joint's `carry` (metres; see `step`) to this joint's, for a row with d = 0."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
 def steps_like(
-    pairs: Sequence[PairLike], phi_in: float, carry: float, tip: float | None
+    pairs: Sequence[PairWithReference], phi_in: float, carry: float, tip: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Compute the transforms between consecutive axes of a path, and theta of each row.
+    """Compute the transforms between consecutive axes of a path, and theta of each row, like a reference.
 
-    If a number can be chosen freely, the function copies the number from another table. `phi_in` (rad) and
-    `carry` (metres) are the angle about the first axis and the offset along it, from frame 0 to the first
-    joint's frame. With the offset `tip` (metres) before the last row, d of the last row equals d in the other
-    table. If `tip` is None, these two numbers may differ, and the last row or the tool contains the
-    difference.
+    `phi_in` (rad) and `carry` (metres) are the angle about the first axis and the offset along it, from frame
+    0 to the first joint's frame. `tip` is the `carry` (metres) of the last joint with which d of the last row
+    is as in the reference; None if d of the last row may differ.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
-        inputs.append((carry, _offset_without_foot(pairs, i, carry, tip)))
+        inputs.append((carry, _free_offset(pairs, i, carry, tip)))
         steps.append(pair.step(*inputs[-1]))
         carry = steps[-1].delta_next
     thetas = []
     for i, pair in enumerate(pairs):
-        if steps[i].free:
-            steps[i] = pair.step(*inputs[i], _phi_of_coinciding(pairs, steps, i, phi_in))
+        if steps[i].phi_is_free:
+            steps[i] = pair.step(*inputs[i], _free_phi(pairs, steps, i, phi_in))
         else:
             steps[i] = _closer_direction(steps[i], pair, phi_in)
-        thetas.append(near(phi_in + steps[i].phi, pair.row.theta))
+        thetas.append(theta_like(phi_in + steps[i].phi, pair.row.theta))
         phi_in = steps[i].phi_next
     return steps, thetas
 
 
-def _offset_without_foot(pairs: Sequence[PairLike], i: int, carry: float, tip: float | None) -> float:
-    """Return d of a row whose two axes do not determine d.
-
-    The function chooses d so that d of this row, or of a later row, equals d in the other table.
-    """
+def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: float | None) -> float:
+    """Return a free d with which d of this row, or of a later row, is as in the reference."""
     pair = pairs[i]
-    if not pair.passes_on or not (pair.slides or (i == 0 and pair.row.d)):
+    if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
         return pair.row.d
     end = i + 1
-    while end < len(pairs) and pairs[end].passes_on and not pairs[end].slides:
+    while end < len(pairs) and pairs[end].offset_is_free and not pairs[end].is_prismatic:
         end += 1
     target = tip
     if end < len(pairs):
-        target = None if pairs[end].slides else pairs[end].row.d - pairs[end].foot
+        target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # The remaining offset becomes part of d of a later prismatic joint, or of the tool.
-        # If there is a Hayati row in between, the plane of its x axis may determine d.
+        # A later prismatic joint or the tool takes the remaining offset, so d can be chosen.
+        # A Hayati row in between makes the choice.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
-        cut = pairs[end].cut
-        if cut is None:
+        hayati_offset = pairs[end].hayati_offset
+        if hayati_offset is None:
             return pair.row.d
         if end == i:
-            return cleaned_length(carry + cut, pair.reach, pair.noise.metres)
-        target = pairs[end].row.d - cut
-    for one in reversed(pairs[i + 1 : end]):
-        target = one.row.d + one.passed_back(target)
-    return cleaned_length(carry - pair.passed_back(target), pair.reach, pair.noise.metres)
+            return cleaned_length(carry + hayati_offset, pair.reach, pair.noise.metres)
+        target = pairs[end].row.d - hayati_offset
+    for later in reversed(pairs[i + 1 : end]):
+        target = later.row.d + later.offset_before(target)
+    return cleaned_length(carry - pair.offset_before(target), pair.reach, pair.noise.metres)
 
 
-def _phi_of_coinciding(
-    pairs: Sequence[PairLike], steps: Sequence[AxisTransform], i: int, phi_in: float
+def _free_phi(
+    pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Return phi for two coinciding axes, for which any value of phi is correct.
-
-    The function chooses phi so that theta of this row, or of the prismatic rows after it, equals theta in the
-    other table.
-    """
+    """Return a free phi with which theta of this row or of later prismatic rows is as in the reference."""
     own = pairs[i].row.theta - phi_in
-    if i > 0 and pairs[i].slides:
+    if i > 0 and pairs[i].is_prismatic:
         return own
     end = i + 1
-    while end < len(pairs) and pairs[end].slides and steps[end].free:
+    while end < len(pairs) and pairs[end].is_prismatic and steps[end].phi_is_free:
         end += 1
-    if end == len(pairs) or not pairs[end].slides:
+    if end == len(pairs) or not pairs[end].is_prismatic:
         return own
     phi = _closer_direction(steps[end], pairs[end]).phi
     for k in range(end - 1, i - 1, -1):
@@ -394,38 +322,34 @@ def _phi_of_coinciding(
     return phi
 
 
-def _closer_direction(step: AxisTransform, pair: PairLike, phi_in: float = 0.0) -> AxisTransform:
-    """Return the `AxisTransform` with the direction of x for which the cells are closer to the other table.
-
-    The function compares the cells a, alpha and beta with the same cells of the other table. If the two
-    directions of x are equally close, the function compares theta.
-    """
+def _closer_direction(step: AxisTransform, pair: PairWithReference, phi_in: float = 0.0) -> AxisTransform:
+    """Choose the direction of x with which a, alpha and beta, and then theta, are closer to the reference."""
     row = pair.row
 
-    def unlike(one: AxisTransform) -> tuple[float, float]:
-        apart = abs(math.remainder(one.alpha - row.alpha, 2.0 * math.pi)) + abs(one.beta - row.beta)
-        turned = abs(math.remainder(phi_in + one.phi - row.theta, 2.0 * math.pi))
-        return round(abs(one.a - row.a) / (pair.reach or 1.0) + apart, 6), turned
+    def difference(step: AxisTransform) -> tuple[float, float]:
+        angles = abs(angle_difference(step.alpha, row.alpha)) + abs(step.beta - row.beta)
+        theta = abs(angle_difference(phi_in + step.phi, row.theta))
+        return round(abs(step.a - row.a) / (pair.reach or 1.0) + angles, 6), theta
 
-    return min((step, step.turned()), key=unlike)
-
-
-def near(theta: float, there: float) -> float:
-    off = math.remainder(theta - there, 2.0 * math.pi)
-    return there if abs(off) <= ANGLE * EPS else cleaned_angle(theta)
+    return min((step, step.with_reversed_x()), key=difference)
 
 
-#: Squares of sums of longer lengths (metres) overflow in common normals and bounds.
+def theta_like(theta: float, reference: float) -> float:
+    """Return the reference if the two angles differ only by rounding; otherwise theta."""
+    return reference if abs(angle_difference(theta, reference)) <= ANGLE * EPS else cleaned_angle(theta)
+
+
+#: Largest length (metres) whose square does not overflow in sums of common normals and bounds.
 LONGEST = 1e150
 
 
-def demand_squares(joints: Iterable[Joint]) -> None:
+def check_lengths(joints: Iterable[Joint]) -> None:
     """Raise RangeError unless the square of each joint's offset is a finite double."""
     for joint in joints:
         _check_length(f"joint {joint.name}", float(np.abs(joint.T_parent_joint[:3, 3]).max()))
 
 
-def demand_squares_of(chain: FrameChain, table: DHTable) -> None:
+def check_lengths_of_table(chain: FrameChain, table: DHTable) -> None:
     """Raise RangeError unless the square of each length of a path and of a table is a finite double."""
     for i, row in enumerate(table.rows):
         for name, length in (("a", row.a), ("d", row.d)):
@@ -454,35 +378,33 @@ class PoseTolerance:
     metres: float
 
 
-def noise_of(joints: int, length: float, reach: float) -> PoseTolerance:
-    """Return the largest angle and length that are treated as rounding errors in a constant pose.
+def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
+    """Return the tolerance of a constant pose, which is the product of the origins of `joints` URDF joints.
 
-    The pose is the product of the origins of `joints` URDF joints; `length` is the sum of their offsets
-    (metres), and `reach` the length of the whole path (metres).
+    `length` is the sum of the offsets of these joints (metres), and `reach` is the length of the whole path.
+    The tolerance covers angles that a program rounded to fifteen digits.
 
-        >>> round(noise_of(1, 0.1, 1.0).radians / EPS, 1), round(noise_of(1, 0.1, 1.0).metres / EPS, 1)
+        >>> tolerance = pose_tolerance(1, 0.1, 1.0)
+        >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)
         (63.7, 4.0)
     """
     computed = (AXES + CONSTANT * joints) * EPS
     return PoseTolerance(computed + WRITTEN * joints * EPS, max(SUMMED * EPS * reach, computed * length))
 
 
-def noises(chain: FrameChain, reach: float) -> list[PoseTolerance]:
+def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
     return [
-        noise_of(joints, float(length), reach)
+        pose_tolerance(joints, float(length), reach)
         for joints, length in zip(chain.folded, chain.lengths, strict=True)
     ]
 
 
 def left_out(chain: FrameChain) -> float:
-    """Return the sum (rad) of those tilts between consecutive axes that are not larger than rounding errors.
-
-    Tilts of z axes and tilts of x axes are both added.
-    """
-    found = 0.0
-    for A, noise in zip(chain.constants, noises(chain, 0.0), strict=True):
-        found += sum(tilt for tilt in (tilt_of(A), abs(float(A[2, 0]))) if tilt <= noise.radians)
-    return found
+    """Return the sum (rad) of the tilts of z and x axes that a table replaces by zero as rounding errors."""
+    total = 0.0
+    for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
+        total += sum(tilt for tilt in (tilt_of(A), abs(float(A[2, 0]))) if tilt <= noise.radians)
+    return total
 
 
 def tilt_of(A: FloatArray) -> float:

@@ -1,12 +1,7 @@
 """Make the Denavit-Hartenberg table of the path between two frames of a robot.
 
-You can request a table with the same frames as a published table. The author of a table chooses the positive
-direction of each joint and the direction of each x axis. `reversed_like` finds all likely combinations of
-positive directions. It derives a table for each combination, and selects the table that is closest to the
-published table. The closest table is the table whose cells differ least. If several tables have equally close
-cells, urdfkin compares the zero positions of the joints, and then base and tool. In the published table of a
-Kinova arm, for example, the positive direction of the first joint is opposite to the URDF. The z axis of
-frame 0 then points up, as in the data sheet.
+The frames can be those of a published table. Its author has chosen the positive direction of each joint. In
+Kinova's table, for example, the positive direction of the first joint is opposite to the URDF.
 """
 
 from __future__ import annotations
@@ -17,29 +12,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.common_normals import NearParallel, demand_squares
+from urdfkin.dh.common_normals import check_lengths
 from urdfkin.dh.compare.agreement import check_joints
-from urdfkin.dh.compare.fit import align
+from urdfkin.dh.compare.signs import align
 from urdfkin.dh.convert import to_convention
-from urdfkin.dh.derive import Choices, First, Last, ParallelOffset, Sign, Slide, choice, derive
-from urdfkin.dh.snapping import checked_tolerance, row_of_constant, snap_chain, snap_thetas, statement
-from urdfkin.dh.table import DHConvention, DHTable, convention_of
+from urdfkin.dh.derive import Choices, derive
+from urdfkin.dh.snapping import check_tolerance, row_of_constant, snap_chain, snap_report, snap_thetas
+from urdfkin.dh.table import DHConvention, DHTable, angle_difference, convention_of
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: A table whose cells differ by more than `_ANOTHER` (rad, or relative to the reach) describes another robot.
-#: Two zero positions of a joint are different if their angles (rad) differ by more than `_OTHER`.
-_ANOTHER, _OTHER = 0.1, 1e-2
-#: Two cells with a smaller difference (relative to the reach, or in rad) are treated as equal.
+#: Largest difference between cells of two tables of the same robot (rad, or relative to the reach).
+_SAME_ROBOT = 0.1
+#: Largest difference (rad) between two equal zero positions, and between rotation entries of equal poses.
+_SAME_ZERO = 1e-2
+#: Largest difference between two equal cells (rad, or relative to the reach).
 _ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
-    """Return a chain's table with the same frames as another table, in the convention of `choices`.
-
-    The attribute `flip` of `choices` must contain the joints from `reversed_like`.
-    """
+    """Return a chain's table with the frames of a reference; `choices.flip` is from `reversed_like`."""
     standard = replace(choices, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
 
@@ -47,24 +40,25 @@ def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTa
 def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tuple[str, ...]:
     """Return the names of the joints that have opposite positive directions in the table and in the URDF.
 
-    If the table has other joints, or describes another robot, InputError is raised.
+    The function derives a table for each likely combination of directions, and selects the closest table. If
+    the reference has other joints, or describes another robot, InputError is raised.
     """
     check_joints(chain, reference)
-    there = to_convention(reference, "standard")
-    ends = replace(there, base=np.eye(4), tool=np.eye(4))
+    standard = to_convention(reference, "standard")
+    without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
-    patterns = [one.senses for one in align(chain, ends)]
+    patterns = [fit.senses for fit in align(chain, without_ends)]
     # A change of base or tool can compensate for a reversed sign of the first or of the last joint.
     # Therefore, both signs are tried for each of these two joints.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
-    best, flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
+    best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
     for senses in dict.fromkeys(patterns):
-        reversed_ = tuple(name for name, sense in zip(names, senses, strict=True) if sense < 0)
-        found = derive(chain, replace(choices, convention=DHConvention.STANDARD, flip=reversed_), there)
-        if (key := _difference_key(found, there, chain.reach or 1.0)) < best:
-            best, flip = key, reversed_
-    if best[0] > _ANOTHER:
+        flip = tuple(name for name, sense in zip(names, senses, strict=True) if sense < 0)
+        table = derive(chain, replace(choices, convention=DHConvention.STANDARD, flip=flip), standard)
+        if (key := _difference_key(table, standard, chain.reach or 1.0)) < best:
+            best, best_flip = key, flip
+    if best[0] > _SAME_ROBOT:
         raise InputError(
             "the table of `like` describes another robot",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
@@ -72,44 +66,39 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
             remedy="compare the table with the URDF by --compare, which reports the differences",
             question=QuestionsSection.DH_AND_URDF_DISAGREE,
         )
-    return flip
+    return best_flip
 
 
-def _difference_key(found: DHTable, there: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a key that ranks tables by their difference from another table; the smallest key is the best.
+def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
+    """Return a key that ranks tables by their difference from a reference; the smallest key is the best.
 
     The entries of the key are, in this order:
 
     - the largest difference of the cells,
-    - the power of ten of the largest difference, here with the cells next to a prismatic axis, which can be
-      shifted,
+    - the power of ten of the largest difference, with the cells that a shift of a prismatic axis changes,
     - the number of rows with different zero positions, plus the number of rows with different signs of d,
     - the number of poses that differ, among base and tool,
     - the number of joints with reversed positive direction.
     """
-    n, cells, lines, zeros = len(found.rows), 0.0, 0.0, 0
-    for i, (row, other) in enumerate(zip(found.rows, there.rows, strict=True)):
-        apart = abs(row.a - other.a) / reach
-        if i < n - 1:  # Base and tool contain the transforms outside the axes.
-            placed = row.kind.turns and found.rows[i + 1].kind.turns
-            cells = max(cells, abs(_angle(row.alpha, other.alpha)), apart * placed)
-            lines = max(lines, abs(row.beta - other.beta), apart)
+    n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
+    for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
+        a = abs(row.a - other.a) / reach
+        theta = abs(angle_difference(row.theta, other.theta))
+        if i < n - 1:  # The tool compensates for differences of a and alpha in the last row.
+            is_unique = row.kind.turns and table.rows[i + 1].kind.turns
+            unique = max(unique, abs(angle_difference(row.alpha, other.alpha)), a * is_unique)
+            shiftable = max(shiftable, abs(row.beta - other.beta), a)
         if 0 < i < n - 1 and row.kind.turns:
-            cells = max(cells, abs(row.d - other.d) / reach)
+            unique = max(unique, abs(row.d - other.d) / reach)
         elif 0 < i < n - 1:
-            lines = max(lines, abs(_angle(row.theta, other.theta)))
-        zeros += abs(_angle(row.theta, other.theta)) > _OTHER
-        zeros += row.d * other.d < 0.0
+            shiftable = max(shiftable, theta)
+        zeros += (theta > _SAME_ZERO) + (row.d * other.d < 0.0)
     ends = sum(
-        float(np.abs(mine[:3, :3] - theirs[:3, :3]).max() > _OTHER)
-        for mine, theirs in ((found.base, there.base), (found.tool, there.tool))
+        float(np.abs(T[:3, :3] - T_reference[:3, :3]).max() > _SAME_ZERO)
+        for T, T_reference in ((table.base, reference.base), (table.tool, reference.tool))
     )
-    power = math.ceil(math.log10(max(cells, lines, _ROUNDING)))
-    return round(cells, 2), power, zeros, ends, sum(row.sense < 0 for row in found.rows)
-
-
-def _angle(one: float, other: float) -> float:
-    return math.remainder(one - other, 2.0 * math.pi)
+    power = math.ceil(math.log10(max(unique, shiftable, _ROUNDING)))
+    return round(unique, 2), power, zeros, ends, sum(row.sense < 0 for row in table.rows)
 
 
 def dh_table(
@@ -138,25 +127,22 @@ def dh_table(
         near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses only the four
             parameters, and may give offsets of kilometres.
         snap: Tolerance in radians. An angle that differs by at most this tolerance from a multiple of 15
-            degrees becomes that multiple. The table's attribute `snap` reports the effect. 0 leaves every
-            angle as it is in the file.
+            degrees becomes that multiple. The table's attribute `snap` reports the effect. 0: exact angles.
         last: "tip": the last row reaches the tip if four parameters suffice. "flange": the tool contains the
             transform from the last axis to the tip.
-        parallel_offset: For consecutive parallel axes: the row that contains the offset along these axes.
-            "last": the last of these rows contains the sum of the offsets. "first": the first of these rows
-            contains the sum. "each": every row contains the offset of its own link.
+        parallel_offset: For consecutive parallel axes: the row that contains the sum of the offsets along
+            them, "last" or "first". "each": every row contains the offset of its own link.
         flip: Names of joints whose positive direction is reversed. The attribute `sense` of their rows is -1.
-        first: "base": if possible, d_1 and theta_1 contain the transform from the base to the first axis.
-            "joint": the base contains this transform, so that d_1 and theta_1 are zero (Craig's frame 0).
+        first: "base": the base is the identity if d_1 and theta_1 can contain the transform to the first
+            axis. "joint": the base contains this transform, and d_1 and theta_1 are zero (Craig's frame 0).
         sign: Rule for the direction of x. "theta": |theta| is at most a right angle. "a": the cell a is not
             negative. "alpha": the cell alpha is not negative.
         slide: Position of the axes of prismatic joints, which define only a direction. "drawn": the axis
             passes through the joint's origin in the URDF. "minimal": the axis passes through the origin of
             the next revolute joint, so that a is 0.
-        like: A published table. The result has the same positive directions of the joints, directions of x,
-            and offsets along parallel axes. The zero positions of the first and the last joint are also the
-            same. The lengths, the angles, the base and the tool come from the URDF. `flip`, `first`, `last`,
-            `sign` and `parallel_offset` are then ignored.
+        like: A published table. The result has its positive directions of the joints, its directions of x,
+            its offsets along parallel axes, and its zero positions of the first and the last joint. All other
+            numbers come from the URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are ignored.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.
@@ -166,28 +152,31 @@ def dh_table(
     exact = chain(tree, tip, base)
     # The whole path from the root is checked, because Pinocchio computes poses relative to the root.
     ends = [tip] if base is None else [base, tip]
-    demand_squares(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
+    check_lengths(tree.joints[i] for end in ends for i in tree.path(tree.frame_link(end)))
     names = [joint.name for joint in exact.joints]
     for name in flip:
         if name not in names:
             raise UnknownNameError("joint", name, names, where=f"path {exact.base} to {exact.tip}")
     choices = Choices(
         convention_of(convention),
-        choice(NearParallel, "near_parallel", near_parallel),
-        choice(Last, "last", last),
-        choice(ParallelOffset, "parallel_offset", parallel_offset),
+        near_parallel,
+        last,
+        parallel_offset,
         tuple(flip),
-        choice(First, "first", first),
-        choice(Sign, "sign", sign),
-        choice(Slide, "slide", slide),
+        first,
+        sign,
+        slide,
     )
     if like is not None:
         choices = replace(choices, flip=reversed_like(exact, choices, like))
-    tolerance = checked_tolerance(snap)
+
+    def derived(path: FrameChain) -> DHTable:
+        return derive(path, choices) if like is None else derive_like(path, choices, like)
+
+    tolerance = check_tolerance(snap)
     if tolerance == 0.0:
-        return derive(exact, choices) if like is None else derive_like(exact, choices, like)
-    rounder, placed = snap_chain(tree, tip, base, tolerance)
-    made = derive(rounder, choices) if like is None else derive_like(rounder, choices, like)
-    table, changes = snap_thetas(made, exact, tolerance)
-    changes += [replace(change, row=row_of_constant(table, k)) for k, change in placed]
-    return replace(table, snap=statement(exact, table, changes, tolerance))
+        return derived(exact)
+    path, pose_changes = snap_chain(tree, tip, base, tolerance)
+    table, changes = snap_thetas(derived(path), exact, tolerance)
+    changes += [replace(change, row=row_of_constant(table, k)) for k, change in pose_changes]
+    return replace(table, snap=snap_report(exact, table, changes, tolerance))

@@ -3,8 +3,7 @@
 `urdfkin.dh.rows` defines the content of TOML and JSON files. A table in text has a line of headings that
 contains a, alpha, d and theta in any order, and below it a line for each joint. Commas, semicolons, tabs,
 bars, ampersands or blanks separate the cells. The lines before and after the table may state the convention,
-names, base and tool. urdfkin prints its own tables in this form. The module never guesses. For example, a
-table without a convention is an error in `urdfkin.dh.rows`.
+names, base and tool, as in the tables that urdfkin prints.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 
-from urdfkin.dh.rows import ORDER, Literal, table_from_mapping
+from urdfkin.dh.rows import LIMIT_KEYS, Literal, table_from_mapping
 from urdfkin.dh.screws import ProductOfExponentials, screws_of_mapping
 from urdfkin.dh.table import DHTable
-from urdfkin.dh.units import Cell, NoCellError, cell_of, spelled
+from urdfkin.dh.units import COLUMNS, InvalidCellError, parse_cell, plain_text
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.escape import from_csv_cell
 from urdfkin.errors.numbers import UNITS
@@ -34,18 +33,17 @@ from urdfkin.kinematics.rotation import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
-#: A printed rotation (six digits) is corrected if the nearest rotation differs by at most this number.
+#: Largest error of a printed rotation, which has six digits.
 _PRINTED = 1e-5
-#: The three rows of a pose must be within this number of lines after the heading of the pose.
-#: Some of these lines may be blank or Markdown fences.
+#: Maximum number of lines from the heading of a pose to its third row, with blank lines and Markdown fences.
 _POSE_LINES = 6
-#: A setting is a line such as `convention: modified`, with or without a comment mark.
+#: Pattern of a line that states a property, such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
-#: In a CSV file each line `# key: value` is a setting; `table_from_mapping` rejects an unknown key.
-_KEY = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
-#: Columns without synonyms
-_OWN = ("leader", "multiplier", "lower", "upper", "velocity", "effort", "sense")
+#: Pattern of a line `# key: value` in CSV; `table_from_mapping` rejects an unknown key.
+_CSV_SETTING = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
+#: Names of columns by their headings.
 _NAMES = {
+    **{name: name for name in ("leader", "multiplier", "sense", *LIMIT_KEYS)},
     **dict.fromkeys(("a", "link length", "length"), "a"),
     **dict.fromkeys(("alpha", "link twist", "twist"), "alpha"),
     **dict.fromkeys(("d", "link offset"), "d"),
@@ -56,8 +54,8 @@ _NAMES = {
     **dict.fromkeys(("kind", "type", "sigma", "joint type"), "kind"),
 }
 _KINDS = {"0": "R", "1": "P"}
-#: Headings of columns with row numbers.
-_COUNTS = ("", "i", "j", "n", "#", "no", "row", "link", "index")
+#: Headings of columns with row numbers
+_ROW_NUMBERS = ("", "i", "j", "n", "#", "no", "row", "link", "index")
 _CONVENTIONS = {
     "modified": r"\b(?:modified|craig(?:'s)?|proximal|mdh)\b",
     "standard": r"\b(?:standard|classic(?:al)?|distal|paul(?:'s)?)\b",
@@ -80,11 +78,10 @@ def from_sheet(text: str) -> dict[str, Any]:
             break
     else:
         raise _no_header(lines)
-    around = [spelled(line) for line in grid.around]
-    # A title line is no setting, even if the name of the robot is "robot".
-    plain = [line for line in grid.around if not _TITLE.search(line)]
-    data = _settings(plain, _KEY if form is _separated else _SETTING)
-    if "convention" not in data and (convention := _convention(around, grid.columns)):
+    # A title line states no property, even if the name of the robot is "robot".
+    without_title = [line for line in grid.around if not _TITLE.search(line)]
+    data = _settings(without_title, _CSV_SETTING if form is _separated else _SETTING)
+    if "convention" not in data and (convention := _convention(grid)):
         data["convention"] = convention
     for line in grid.around:
         if title := _TITLE.search(_unescaped(line.replace("`", ""))):
@@ -93,16 +90,19 @@ def from_sheet(text: str) -> dict[str, Any]:
     for end in ("base", "tool"):
         if end not in data and (pose := _pose(end, grid.around)):
             data[end] = pose
-    # Each cell gets the unit in its column's heading, so the table needs no common unit.
-    named = _named_coordinates(grid.around)
     data["rows"] = [_row(grid, cells, i) for i, cells in enumerate(grid.rows)]
-    _interpret_variables(data, named)
+    _interpret_variables(data, _coordinate_names(grid.around))
     return data
 
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of a table in text; `previous` says whether the heading contains i-1."""
+    """A column of a table in text.
+
+    Attributes:
+        name: Name of the cells in `urdfkin.dh.rows`; "" for an unknown heading.
+        previous: Whether the heading contains i-1.
+    """
 
     name: str
     heading: str = ""
@@ -112,17 +112,18 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """A table that was found in a text, and all lines outside the table (`around`).
+    """The cells of a table in a text.
 
     Attributes:
-        commas: Whether a comma in a cell is a decimal comma.
+        around: All lines outside the table.
+        decimal_commas: Whether a comma in a cell is a decimal comma.
         strict: Whether an unknown column is an error.
     """
 
     columns: tuple[_Column, ...]
     rows: list[list[str]]
     around: list[str]
-    commas: bool = False
+    decimal_commas: bool = False
     strict: bool = False
 
 
@@ -160,12 +161,12 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
 
 
 def _no_header(lines: list[str]) -> InputError:
-    """Return the error for missing headings; it quotes the line with the most required headings."""
-    said = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
-    named = [[cell.strip() for cell in cells if cell.strip()] for cells in said]
-    best = max(named, key=lambda cells: sum(_column(cell).name in ORDER for cell in cells), default=[])
+    """Return the error for missing headings, with the line that has most of the required headings."""
+    split = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
+    rows = [[cell.strip() for cell in cells if cell.strip()] for cells in split]
+    best = max(rows, key=lambda cells: sum(_column(cell).name in COLUMNS for cell in cells), default=[])
     names = [_column(cell).name for cell in best]
-    missing = next((name for name in ORDER if name not in names), None)
+    missing = next((name for name in COLUMNS if name not in names), None)
     if missing is None:
         return InputError(
             "the line of column headings has another separator than the other lines",
@@ -178,7 +179,7 @@ def _no_header(lines: list[str]) -> InputError:
         f"the table has no column {missing!r}",
         where="header",
         found=", ".join(best)[:200] or "nothing",
-        remedy=f"write a line of headings above the rows, with {', '.join(ORDER)}",
+        remedy=f"write a line of headings above the rows, with {', '.join(COLUMNS)}",
     )
 
 
@@ -199,7 +200,7 @@ def _latex(lines: list[str]) -> _Grid | None:
 
 
 def _bars(lines: list[str]) -> _Grid | None:
-    """Parse columns that are separated by the character | or by vertical box-drawing characters."""
+    """Parse cells that are separated by | or by vertical box-drawing characters."""
     plain = [re.sub("[\u2502\u2503\u2551]", "|", line) for line in lines]
     plain = [re.sub(r"\\([\[\]()])", r"\1", line) for line in plain]  # Markdown escapes brackets: a \[m\].
 
@@ -214,11 +215,9 @@ def _separated(lines: list[str]) -> _Grid | None:
 
     If semicolons or tabs separate the cells, a comma inside a cell is a decimal comma.
     """
-    for mark in (";", "\t", ","):
-        kept = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
-        if grid := _grid(kept, partial(_csv_cells, mark=mark), mark):
-            return grid
-    return None
+    lines = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
+    grids = (_grid(lines, partial(_csv_cells, mark=mark), mark) for mark in (";", "\t", ","))
+    return next(filter(None, grids), None)
 
 
 def _csv_cells(line: str, mark: str) -> list[str]:
@@ -226,7 +225,7 @@ def _csv_cells(line: str, mark: str) -> list[str]:
 
 
 def _aligned(lines: list[str]) -> _Grid | None:
-    """Parse columns separated by two or more blanks, or by one blank if no cell contains a blank."""
+    """Parse cells that are separated by two or more blanks, or by one blank if no cell contains a blank."""
 
     def loose(line: str) -> list[str]:
         return [cell for cell in re.split(r"\s{2,}", line.strip()) if cell]
@@ -239,10 +238,10 @@ def _aligned(lines: list[str]) -> _Grid | None:
 
 
 def _columns(cells: list[str]) -> tuple[_Column, ...] | None:
-    """Parse a line of headings; return None unless a, alpha, d and theta all occur and names are unique."""
+    """Parse a line of headings; return None unless a, alpha, d and theta all occur."""
     columns = tuple(map(_column, cells))
     names = [column.name for column in columns]
-    if any(name not in names for name in ORDER):
+    if any(name not in names for name in COLUMNS):
         return None
     double = [name for name in names if name and names.count(name) > 1]
     if double:
@@ -251,8 +250,7 @@ def _columns(cells: list[str]) -> tuple[_Column, ...] | None:
 
 
 def _column(heading: str) -> _Column:
-    """Parse a heading; an unknown name gives a column with the name ""."""
-    text = spelled(heading).strip("*` ")
+    text = plain_text(heading).strip("*` ")
     unit = None
     if found := re.search(
         r"[\[(/]\s*(" + "|".join(sorted(UNITS, key=len, reverse=True)) + r")\s*[\])]?\s*$", text
@@ -265,10 +263,10 @@ def _column(heading: str) -> _Column:
         .strip(" _{}()")
         .lower()
     )
-    return _Column(text if text in _OWN else _NAMES.get(text, ""), text, unit, previous)
+    return _Column(_NAMES.get(text, ""), text, unit, previous)
 
 
-# -- the lines around the table-------------------------------------------------------------------------
+# -- the lines around the table ------------------------------------------------------------------------
 
 
 def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
@@ -282,17 +280,13 @@ def _settings(lines: list[str], pattern: re.Pattern[str]) -> dict[str, Any]:
     return data
 
 
-def _convention(around: list[str], columns: tuple[_Column, ...]) -> str | None:
-    """Return the convention that the headings or the text name.
-
-    The result is None if the headings and the text name no convention, or both the standard and the modified
-    convention.
-    """
-    if any(column.previous for column in columns):
+def _convention(grid: _Grid) -> str | None:
+    """Return the convention that the headings or the text name; None if the text names none or both."""
+    if any(column.previous for column in grid.columns):
         return "modified"
-    text = "\n".join(around)
-    said = [name for name, words in _CONVENTIONS.items() if re.search(words, text, re.IGNORECASE)]
-    return said[0] if len(said) == 1 else None
+    text = "\n".join(map(plain_text, grid.around))
+    names = [name for name, pattern in _CONVENTIONS.items() if re.search(pattern, text, re.IGNORECASE)]
+    return names[0] if len(names) == 1 else None
 
 
 def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
@@ -300,7 +294,7 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
     matrix = rf"{end.title()} \(m\): \$\\begin{{bmatrix}}(.*?)\\end{{bmatrix}}"
     if found := re.search(matrix, " ".join(lines)):
         return _rigid(
-            [[cell_of(cell).number for cell in row.split("&")] for row in found[1].split(r"\\")], end
+            [[parse_cell(cell).number for cell in row.split("&")] for row in found[1].split(r"\\")], end
         )
     for k, line in enumerate(lines):
         if line.strip().lower().startswith(f"{end} (metres):"):
@@ -311,24 +305,18 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Replace a printed rotation with the nearest exact rotation if it differs only by the printed digits.
-
-    A number that is not finite raises InputError.
-    """
+    """Replace a printed rotation with the nearest exact rotation if it differs only by the printed digits."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
-    off = polar_factor(pose[:3, :3]) - pose[:3, :3]
-    if ROUNDED < np.abs(off).max() < _PRINTED:
-        pose[:3, :3] += off
+    correction = polar_factor(pose[:3, :3]) - pose[:3, :3]
+    if ROUNDED < np.abs(correction).max() < _PRINTED:
+        pose[:3, :3] += correction
     return [[float(number) for number in row] for row in pose]
 
 
-def _named_coordinates(lines: list[str]) -> list[str]:
-    """Return the joint names in a line such as `with q1 = left, q2 = right`.
-
-    urdfkin prints this line if the coordinates differ from the joints of the rows, or have another order.
-    """
+def _coordinate_names(lines: list[str]) -> list[str]:
+    """Return the joint names in a line such as `with q1 = left, q2 = right`; [] without such a line."""
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
     return [_unescaped(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
 
@@ -337,16 +325,16 @@ def _named_coordinates(lines: list[str]) -> list[str]:
 
 
 def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
-    """Return a row as a mapping from column names to cells with units; optional empty cells are left out."""
+    """Return a row as a mapping from column names to cells with units, without optional empty cells."""
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
-        if not column.name and grid.strict and column.heading not in _COUNTS:
+        if not column.name and grid.strict and column.heading not in _ROW_NUMBERS:
             row[column.heading] = cell  # `table_from_mapping` rejects this heading.
-        elif not column.name or (not cell and column.name not in ORDER):
+        elif not column.name or (not cell and column.name not in COLUMNS):
             continue
-        elif column.name in (*ORDER, "beta", "offset"):
+        elif column.name in (*COLUMNS, "beta", "offset"):
             where = f"row {index + 1}, {column.name}"
-            row[column.name] = _number(cell, column, where, grid.commas)
+            row[column.name] = _with_unit(cell, column, where, grid.decimal_commas)
         elif column.name == "kind":
             row["kind"] = _KINDS.get(cell, cell)
         else:
@@ -354,21 +342,21 @@ def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
     return _nested(row)
 
 
-def _number(cell: str, column: _Column, where: str, commas: bool) -> str:
-    """Return a cell as text with its own unit or its column's unit; raise InputError for an invalid cell."""
-    text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", cell) if commas else cell
+def _with_unit(original: str, column: _Column, where: str, decimal_commas: bool) -> str:
+    """Return the plain text of a cell, with the unit of its column if the cell has none."""
+    text = re.sub(r"(?<=[0-9]),(?=[0-9])", ".", original) if decimal_commas else original
     try:
-        found: Cell = cell_of(text)
-    except NoCellError as error:
-        decimal = "separate cells by semicolons if commas are decimal" if "," in cell else f"{error}"
+        cell = parse_cell(text)
+    except InvalidCellError as error:
+        problem = "separate cells by semicolons if commas are decimal" if "," in original else f"{error}"
         raise InputError(
             "this is not a number",
             where=where,
-            found=safe_repr(cell),
-            remedy=f"{decimal}: write 1.5708, pi/2 or 90 deg",
+            found=safe_repr(original),
+            remedy=f"{problem}: write 1.5708, pi/2 or 90 deg",
         ) from None
-    plain = spelled(text)
-    return f"{plain} {column.unit}" if column.unit and found.unit is None and found.number else plain
+    plain = plain_text(text)
+    return f"{plain} {column.unit}" if column.unit and cell.unit is None and cell.number else plain
 
 
 def _unescaped(name: str) -> str:
@@ -381,30 +369,31 @@ def _nested(row: dict[str, Any]) -> dict[str, Any]:
 
     If the row has no mimic rule, `offset` is added to theta or d.
     """
-    leads: dict[str, Any] = {key: row.pop(key) for key in ("leader", "multiplier") if key in row}
-    if leads and "offset" in row:
-        leads["offset"] = row.pop("offset")
-    limit = {key: row.pop(key) for key in ("lower", "upper", "velocity", "effort") if key in row}
+    mimic: dict[str, Any] = {key: row.pop(key) for key in ("leader", "multiplier") if key in row}
+    if mimic and "offset" in row:
+        mimic["offset"] = row.pop("offset")
+    limit = {key: row.pop(key) for key in LIMIT_KEYS if key in row}
     if "offset" in row:
         name = "d" if str(row.get("kind", "R")).upper().startswith("P") else "theta"
         row[name] = f"{row[name]} + {row.pop('offset')}".replace("+ -", "- ").replace("+ +", "+ ")
-    return {**row, **({"mimic": leads} if leads else {}), **({"limit": limit} if limit else {})}
+    return {**row, **({"mimic": mimic} if mimic else {}), **({"limit": limit} if limit else {})}
 
 
-def _interpret_variables(data: dict[str, Any], named: list[str]) -> None:
-    """Interpret the variables q1, q2, ... of the rows.
+def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
+    """Make a mimic rule of each variable q1, q2, ... that is not the row's own.
 
-    If a row contains the variable of another row, its joint mimics the joint of the other row.
+    `coordinates` are the joints of q1, q2, ...; [] stands for the joints of the rows.
     """
     rows = data["rows"]
-    names = named or [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
+    joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
+    names = coordinates or joints
     for i, row in enumerate(rows):
         for name in ("theta", "d"):
-            cell = cell_of(row[name])
-            if cell.times is None or (
-                cell.variable in (None, i + 1) and abs(cell.times) == 1.0 and not named
-            ):
+            cell = parse_cell(row[name])
+            if cell.factor is None:
                 continue
+            if not coordinates and cell.variable in (None, i + 1) and abs(cell.factor) == 1.0:
+                continue  # `table_from_mapping` interprets the row's own variable.
             number = cell.variable or i + 1
             if number > len(names):
                 raise InputError(
@@ -412,33 +401,31 @@ def _interpret_variables(data: dict[str, Any], named: list[str]) -> None:
                     where=f"row {i + 1}, {name}",
                     found=row[name],
                 )
-            row |= {
-                "kind": row.get("kind", "R" if name == "theta" else "P"),
-                name: f"{cell.number!r} {cell.unit or ''}",
-            }
-            if names[number - 1] == row.get("joint", f"joint_{i + 1}") and abs(cell.times) == 1.0:
-                row["sense"] = cell.times
+            row |= {"kind": row.get("kind", "R" if name == "theta" else "P"), name: cell.constant}
+            if names[number - 1] == joints[i] and abs(cell.factor) == 1.0:
+                row["sense"] = cell.factor
             else:
-                row["mimic"] = {"leader": names[number - 1], "multiplier": cell.times}
-    moving = {row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)}
-    if elsewhere := [name for name in named if name not in moving]:
+                row["mimic"] = {"leader": names[number - 1], "multiplier": cell.factor}
+    if elsewhere := [name for name in coordinates if name not in joints]:
         data.setdefault("coordinates", elsewhere)
 
+
+# -- files ---------------------------------------------------------------------------------------------
 
 _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a robot's source is the path of a table file, judged by its suffix.
+    """Whether a robot's source is the path of a table file; a .txt file may also be a URDF.
 
     >>> is_table_file("arm.toml"), is_table_file("arm.urdf"), is_table_file("<robot/>")
     (True, False, False)
     """
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return False
-    if not isinstance(source, str | os.PathLike) or (ending := Path(source).suffix.lower()) not in _PARSERS:
+    if not isinstance(source, str | os.PathLike) or (suffix := Path(source).suffix.lower()) not in _PARSERS:
         return False
-    return ending != ".txt" or not _is_markup(Path(source))
+    return suffix != ".txt" or not _is_markup(Path(source))
 
 
 def read_table(path: str | os.PathLike[str]) -> DHTable:
@@ -458,16 +445,13 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table, or a product of exponentials if the file contains the key M.
-
-    Raises the same errors as `read_table`.
-    """
+    """Read a table, or screws if the file contains the key M; errors as for `read_table`."""
     data = read_mapping(path)
     return _with_place(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
 
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """Return the plain data of a table file; each number keeps its text. Errors are as for `read_table`."""
+    """Return the plain data of a table file; errors as for `read_table`."""
     return mapping_from_text(read_text(Path(path), pipes=True), Path(path).suffix.lower(), where=str(path))
 
 
@@ -528,6 +512,7 @@ _PARSERS: dict[str, Callable[[str], Any]] = {
 
 
 def references() -> dict[str, Path]:
+    """Return the files of the published tables that urdfkin contains, by name."""
     return {path.stem: path for path in sorted((robots_dir() / "dh").glob("*.toml"))}
 
 
@@ -543,14 +528,11 @@ def published(robot: str) -> list[str]:
 
 
 def reference_path(name: str) -> Path:
-    """Return the file of a table, given its path or the name of a reference table.
-
-    If there is no such file and no such table, UnknownNameError lists the nearest names.
-    """
+    """Return the file of a table, given its path or the name in `references`; else raise UnknownNameError."""
     path = Path(name)
     if path.suffix or exists(path):
         return path
-    shipped = references()
-    if name not in shipped:
-        raise UnknownNameError("reference table", name, shipped)
-    return shipped[name]
+    files = references()
+    if name not in files:
+        raise UnknownNameError("reference table", name, files)
+    return files[name]

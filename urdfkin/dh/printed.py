@@ -1,10 +1,4 @@
-"""Compute the tip error of a printed table, which is caused by the rounding of its numbers.
-
-The rounding error of an angle rotates the rest of the chain. This rotation moves the tip by at most the error
-times the sum of all later lengths. The rounding error of a length shifts the rest of the chain. The sum of
-these effects is a bound of the tip error for every configuration within the limits. The module also computes
-the largest error in sampled configurations.
-"""
+"""Compute the tip error that the rounding of the numbers in a printed table causes."""
 
 from __future__ import annotations
 
@@ -14,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.dh.export.text import at_most, constant_of
-from urdfkin.dh.snapping import SAMPLES, UNKNOWN, travel
-from urdfkin.dh.table import DHRow, DHTable
+from urdfkin.dh.snapping import SAMPLES, samples_within_limits, travel
+from urdfkin.dh.table import DHRow, DHTable, is_identity
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units, cell_in_si, read_number
-from urdfkin.model.configuration import axis_range, values_within
+from urdfkin.model.configuration import axis_range
 from urdfkin.model.tree import FloatArray
 
 
@@ -28,9 +22,9 @@ class PrintedPrecision:
 
     Attributes:
         digits: Number of printed significant digits.
-        metres: Largest distance, on samples, between the tips of the printed table and of the exact table.
-        bound: Guaranteed bound (metres) of this distance at all joint values within the limits; None if there
-            is no bound.
+        metres: Largest distance between the tips of the printed and of the exact table on the samples.
+        bound: Guaranteed bound (metres) of this distance within the joint limits; None without a bound.
+        samples: Number of sampled configurations.
     """
 
     digits: int
@@ -49,34 +43,29 @@ class PrintedPrecision:
 def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
     """Parse the printed form of a table, and compare the printed table with the exact table.
 
-    `pose_digits` are the significant digits of base and tool; None: as many digits as in `units`.
+    `pose_digits` is the number of significant digits of base and tool; None: as many digits as in `units`.
     """
-    digits = pose_digits or units.digits
-    rows = tuple(_row(row, units) for row in table.rows)
-    base, tool = (_pose(T, digits) for T in (table.base, table.tool))
-    bounds = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
-    q = values_within([bounds.get(name, UNKNOWN) for name in table.joint_names], SAMPLES)
+    rows = tuple(_printed_row(row, units) for row in table.rows)
+    base, tool = (_printed_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
+    q = samples_within_limits(table)
     # A DHTable accepts only exact rotations, so the rounded base and tool are multiplied separately.
-    between = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
-    off = np.linalg.norm((base @ between @ tool - table.placement(q))[:, :3, 3], axis=-1)
+    T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
+    distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)
-    worst = float(off.max(initial=0.0))
-    return PrintedPrecision(units.digits, worst, bound if math.isfinite(bound) else None, SAMPLES)
+    finite_bound = bound if math.isfinite(bound) else None
+    return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), finite_bound, SAMPLES)
 
 
-def _row(row: DHRow, units: Units) -> DHRow:
-    a, alpha, d, theta, beta = row.cells
+def _printed_row(row: DHRow, units: Units) -> DHRow:
     rule = row.mimic
-    own = row.sense * rule.offset if rule else 0.0  # The printed constant includes this offset.
-    constant = constant_of(row)
-    theta, d = (
-        (_angle(constant, units) - own, _length(d, units))
-        if row.kind.turns
-        else (_angle(theta, units), _length(constant, units) - own)
-    )
+    mimic_offset = row.sense * rule.offset if rule else 0.0  # The printed constant includes this offset.
+    if row.kind.turns:
+        theta, d = _angle(constant_of(row), units) - mimic_offset, _length(row.d, units)
+    else:
+        theta, d = _angle(row.theta, units), _length(constant_of(row), units) - mimic_offset
     if rule is not None:
         rule = replace(rule, multiplier=float(f"{rule.multiplier:.10g}"))
-    a, alpha, beta = _length(a, units), _angle(alpha, units), _angle(beta, units)
+    a, alpha, beta = _length(row.a, units), _angle(row.alpha, units), _angle(row.beta, units)
     return replace(row, a=a, alpha=alpha, d=d, theta=theta, beta=beta, mimic=rule)
 
 
@@ -90,44 +79,41 @@ def _length(metres: float, units: Units) -> float:
     return cell_in_si("d", read_number(units.length(metres), "printed"), units)
 
 
-def _pose(T: FloatArray, digits: int) -> FloatArray:
-    if np.array_equal(T, np.eye(4)):
-        return T
-    return np.array([[float(f"{x:.{digits}g}") for x in row] for row in T])
+def _printed_pose(T: FloatArray, digits: int) -> FloatArray:
+    return T if is_identity(T) else np.array([[float(f"{x:.{digits}g}") for x in row] for row in T])
 
 
 def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """Return the sum of the tip errors (metres) that the rounding of each number can cause.
+    """Return the sum of the largest tip errors (metres) that the rounding of each number can cause.
 
-    The rounding error of an angle is multiplied by the largest possible distance from the row's frame to the
-    tip.
+    The rounding error of an angle moves the tip by at most this error times `lever`, the largest distance
+    from the row's frame to the tip.
     """
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
-    for row, other in zip(reversed(table.rows), reversed(rows), strict=True):
-        slides = 0.0 if row.kind.turns else travel(row.limit)
-        lever += abs(row.a) + abs(row.d) + slides
-        if row.mimic is not None and other.mimic is not None:
-            slides = max(abs(bound) for bound in axis_range(row.kind, row.limit))
-            total += abs(row.mimic.multiplier - other.mimic.multiplier) * slides * max(lever, 1.0)
-        changes = np.abs(np.subtract(row.cells, other.cells))
-        total += float(changes[[0, 2]].sum() + changes[[1, 3, 4]].sum() * lever)
-    turned, shifted = (base - table.base)[:3, :3], (base - table.base)[:3, 3]
-    stretched = 1.0 + float(np.linalg.norm(turned))
-    total = total * stretched + float(np.linalg.norm(turned)) * lever + float(np.linalg.norm(shifted))
+    for row, printed_row in zip(reversed(table.rows), reversed(rows), strict=True):
+        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else travel(row.limit))
+        if row.mimic is not None and printed_row.mimic is not None:
+            largest_value = max(abs(bound) for bound in axis_range(row.kind, row.limit))
+            multiplier_error = abs(row.mimic.multiplier - printed_row.mimic.multiplier)
+            total += multiplier_error * largest_value * max(lever, 1.0)
+        errors = np.abs(np.subtract(row.cells, printed_row.cells))
+        total += float(errors[[0, 2]].sum() + errors[[1, 3, 4]].sum() * lever)
+    base_error = base - table.base
+    rotation_error = float(np.linalg.norm(base_error[:3, :3]))
+    total = total * (1.0 + rotation_error) + rotation_error * lever + float(np.linalg.norm(base_error[:3, 3]))
     return total + table.rounding(np.zeros(len(table.joint_names))).item()
 
 
 def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
-    """Return the error of a robot's printed parameters at `q` (n, coordinates), at the worst link."""
-    again = replace(table, rows=tuple(_tree_row(row, units) for row in table.rows))
-    off = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
-    return PrintedPrecision(units.digits, float(off.max(initial=0.0)), None, len(q))
+    """Return the largest position error of any link with printed parameters, at `q` (n, coordinates)."""
+    again = replace(table, rows=tuple(_printed_tree_row(row, units) for row in table.rows))
+    distances = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
+    return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), None, len(q))
 
 
-def _tree_row(row: TreeRow, units: Units) -> TreeRow:
-    theta, r = row.theta, row.r
-    turns, slides = (row.offset if row.sigma == kind else 0.0 for kind in (0, 1))
+def _printed_tree_row(row: TreeRow, units: Units) -> TreeRow:
+    theta_offset, r_offset = (row.offset if row.sigma == kind else 0.0 for kind in (0, 1))
     return replace(
         row,
         gamma=_angle(row.gamma, units),
@@ -135,7 +121,7 @@ def _tree_row(row: TreeRow, units: Units) -> TreeRow:
         alpha=_angle(row.alpha, units),
         d=_length(row.d, units),
         beta=_angle(row.beta, units),
-        theta=_angle(theta + turns, units) - turns,
-        r=_length(r + slides, units) - slides,
+        theta=_angle(row.theta + theta_offset, units) - theta_offset,
+        r=_length(row.r + r_offset, units) - r_offset,
         multiplier=float(f"{row.multiplier:.10g}"),
     )

@@ -15,11 +15,6 @@ joint's value. In a modified table a and alpha of row i are a_{i-1} and alpha_{i
 row is {leader, multiplier, offset}; the entry `limit` is {lower, upper, velocity, effort}. The units apply to
 cells, limits, offsets of mimic joints, and the positions of base and tool. A multiplier is the ratio of two
 joint values in SI units. An effort is in N or N m.
-
-`last_digits` returns the precision of each number as it is written: half a unit of its last digit. For
-example, 311.1 mm in a data sheet is uncertain by 0.05 mm. A number without a decimal point (90 degrees, zero)
-and a multiple of pi are exact. However, a whole number of millimetres is not treated as exact: it is
-uncertain by 0.5 mm.
 """
 
 from __future__ import annotations
@@ -33,10 +28,38 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.dh.table import DHRow, DHTable, convention_of, looks_round
-from urdfkin.dh.units import Angles, Cell, NoCellError, Units, cell_in_si, cell_of, read_number, units_of
+from urdfkin.dh.units import (
+    COLUMNS,
+    Angles,
+    Cell,
+    InvalidCellError,
+    Units,
+    cell_in_si,
+    parse_cell,
+    read_number,
+    units_of,
+)
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.validators import safe_repr
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic
+
+_CELLS = (*COLUMNS, "beta")
+_KINDS = {
+    "r": JointKind.REVOLUTE,
+    "p": JointKind.PRISMATIC,
+    "revolute": JointKind.REVOLUTE,
+    "continuous": JointKind.CONTINUOUS,
+    "prismatic": JointKind.PRISMATIC,
+}
+_MIMIC_KEYS, LIMIT_KEYS = ("leader", "multiplier", "offset"), ("lower", "upper", "velocity", "effort")
+_ROW_KEYS = ("joint", "kind", *_CELLS, "sense", "mimic", "limit")
+_TABLE_KEYS = (
+    *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
+    *("coordinates", "rows"),
+)
+#: Keys that describe a table, for example the source of the numbers, without changing it.
+_NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
+_BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
 
 class Literal(float):
@@ -56,30 +79,29 @@ def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
     `data` is a valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
     """
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
-    return tuple(_of_row(row, units) for row in data["rows"])
+    rows = []
+    for row in data["rows"]:
+        cells = row if isinstance(row, Mapping) else by_column(row)
+        rows.append({name: _last_digit(name, cells[name], units) for name in _CELLS if name in cells})
+    return tuple(rows)
 
 
-def _of_row(row: Mapping[str, Any] | Sequence[Any], units: Units) -> dict[str, float]:
-    cells = row if isinstance(row, Mapping) else dict(zip(ORDER, row, strict=False))
-    found = {}
-    for name in (*ORDER, "beta"):
-        if name in cells:
-            value, unit = cells[name], units
-            if isinstance(value, str):
-                unit = units_in(cell_of(value), units)
-            half = half_a_digit(value, name in "ad" and unit.counts_millimetres)
-            found[name] = cell_in_si(name, half, unit)
-    return found
+def _last_digit(name: str, value: object, units: Units) -> float:
+    if isinstance(value, str):
+        units = units_in(parse_cell(value), units)
+    return cell_in_si(name, half_a_digit(value, name in ("a", "d") and units.counts_millimetres), units)
 
 
 def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     """Return half a unit of a written number's last digit; 0 if the number is exact.
 
+    A whole number is exact unless `whole_is_rounded`: 425 mm is uncertain by 0.5 mm, and 90 deg is exact.
+
     >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
     (5e-05, 0.0, 0.5, 0.0)
     """
     text = value.text if isinstance(value, Literal) else str(value)
-    text = (cell_of(value).text or "0") if isinstance(value, str) else text
+    text = (parse_cell(value).text or "0") if isinstance(value, str) else text
     try:
         number = Decimal(text)
     except InvalidOperation:
@@ -90,32 +112,24 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     return 0.5 * 10.0 ** min(exponent, 0)
 
 
-#: A row that is a list has its cells in this order, and may end with "R" or "P".
-ORDER = ("a", "alpha", "d", "theta")
-_KINDS = {
-    "r": JointKind.REVOLUTE,
-    "p": JointKind.PRISMATIC,
-    "revolute": JointKind.REVOLUTE,
-    "continuous": JointKind.CONTINUOUS,
-    "prismatic": JointKind.PRISMATIC,
-}
-_KEYS = ("joint", "kind", *ORDER, "sense", "beta", "mimic", "limit")
-_BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
+def by_column(row: Sequence[Any]) -> dict[str, Any]:
+    """Return a row that is a list as a mapping."""
+    return dict(zip((*COLUMNS, "kind"), row, strict=False))
 
 
-def written_row(row: Any, index: int, units: Units) -> DHRow:
-    """Parse a handwritten row: a `DHRow`, a mapping of its fields, or a list in the order of `ORDER`.
+def parse_row(row: Any, index: int, units: Units) -> DHRow:
+    """Parse a handwritten row: a `DHRow`, a mapping of its fields, or a list; `index` counts from 0.
 
-    `index` counts from 0. InputError names the row and the column.
+    InputError names the row and the column.
     """
     if isinstance(row, DHRow):
         return row
     row = row.tolist() if isinstance(row, np.ndarray) else row
     where = f"row {index + 1}"
     fields = row if isinstance(row, Mapping) else _of_list(row, where)
-    check_keys(fields, _KEYS, "a row", where)
+    check_keys(fields, _ROW_KEYS, "a row", where)
     fields = _split_variable(fields, index, where)
-    cells = {name: _cell(name, fields.get(name, 0.0), units, where) for name in (*ORDER, "beta")}
+    cells = {name: _cell(name, fields.get(name, 0.0), units, where) for name in _CELLS}
     return DHRow(
         **cells,
         kind=_kind(fields.get("kind", "R"), where),
@@ -126,13 +140,11 @@ def written_row(row: Any, index: int, units: Units) -> DHRow:
     )
 
 
-def refuse_other_order(rows: Sequence[Any]) -> None:
+def _check_order(rows: Sequence[Any]) -> None:
     """Raise InputError for lists that seem to have the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles of a table are nearly always multiples of 15 degrees. Lengths hardly ever look like such angles. In
-    the Robotics Toolbox's order, the first and the fourth column contain angles, and the second column
-    contains lengths. Rows are rejected if the first and the fourth column look like angles, and the second
-    column looks like lengths.
+    Angles of a table are nearly always multiples of 15 degrees, and lengths hardly ever. Rows are rejected if
+    all numbers in the first and the fourth column are such multiples, but none in the second column.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
@@ -141,7 +153,7 @@ def refuse_other_order(rows: Sequence[Any]) -> None:
     if second and fourth and not any(map(_looks_round, second)) and all(map(_looks_round, [*first, *fourth])):
         raise InputError(
             "the columns look like theta, d, a, alpha, the Robotics Toolbox's order; a list must have"
-            f" {', '.join(ORDER)}",
+            f" {', '.join(COLUMNS)}",
             where=f"rows 1 to {len(rows)}",
             found=f"second column {second[0]!r}, fourth column {fourth[0]!r}",
             remedy=_BY_NAME,
@@ -156,7 +168,7 @@ def name_of(value: Any, where: str) -> str:
 
 
 def _has_order(row: Sequence[Any]) -> bool:
-    return len(row) == len(ORDER) or (len(row) == len(ORDER) + 1 and isinstance(row[-1], str))
+    return len(row) == len(COLUMNS) or (len(row) == len(COLUMNS) + 1 and isinstance(row[-1], str))
 
 
 def _looks_round(value: Any) -> bool:
@@ -169,63 +181,62 @@ def _looks_round(value: Any) -> bool:
 
 
 def _of_list(row: Any, where: str) -> dict[str, Any]:
-    wanted = f"[{', '.join(ORDER)}, 'R' or 'P']"
+    form = f"[{', '.join(COLUMNS)}, 'R' or 'P']"
     if not isinstance(row, Sequence) or isinstance(row, (str, bytes)):
-        raise InputError(f"a row must be a mapping or {wanted}", where=where, found=repr(row))
-    if not len(ORDER) <= len(row) <= len(ORDER) + 1:
+        raise InputError(f"a row must be a mapping or {form}", where=where, found=repr(row))
+    if not len(COLUMNS) <= len(row) <= len(COLUMNS) + 1:
         raise InputError(
-            f"a row must be a mapping or {wanted}",
+            f"a row must be a mapping or {form}",
             where=where,
             found=f"{len(row)} entries, {list(row)!r}",
             remedy=_BY_NAME,
         )
-    if len(row) > len(ORDER) and not isinstance(row[-1], str):
+    if len(row) > len(COLUMNS) and not isinstance(row[-1], str):
         raise InputError(
-            f"a row's fifth entry must be 'R' or 'P': {wanted}",
+            f"a row's fifth entry must be 'R' or 'P': {form}",
             where=where,
             found=repr(row[-1]),
             remedy=f"the Robotics Toolbox's order is theta, d, a, alpha, sigma: {_BY_NAME}",
         )
-    return dict(zip((*ORDER, "kind"), row, strict=False))
+    return by_column(row)
 
 
-def check_keys(given: Iterable[str], keys: Sequence[str], what: str, where: str | None = None) -> None:
-    for key in given:
-        if key not in keys:
+def check_keys(keys: Iterable[str], known: Sequence[str], what: str, where: str | None = None) -> None:
+    for key in keys:
+        if key not in known:
             raise InputError(
                 f"unknown key in {what}",
                 where=where,
                 found=repr(key),
-                remedy=f"the known keys are {', '.join(keys)}",
+                remedy=f"the known keys are {', '.join(known)}",
             )
 
 
 def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mapping[str, Any]:
     """Replace a cell such as "q3 + pi" with the constant pi; add the keys `kind` and `sense` to the row."""
-    written = {name: fields[name] for name in ORDER if isinstance(fields.get(name), str)}
-    cells = {name: _read(value, f"{where}, {name}") for name, value in written.items()}
-    own = [name for name, cell in cells.items() if cell.times is not None]
-    if not own:
+    texts = {name: fields[name] for name in COLUMNS if isinstance(fields.get(name), str)}
+    cells = {name: _parse_cell(text, f"{where}, {name}") for name, text in texts.items()}
+    variables = [name for name, cell in cells.items() if cell.factor is not None]
+    if not variables:
         return fields
-    name, cell = own[0], cells[own[0]]
-    kind = {"theta": "R", "d": "P"}.get(name)
-    at = f"{where}, {name}"
-    if len(own) > 1 or kind is None or _kind(fields.get("kind", kind), where).turns != (kind == "R"):
+    name = variables[0]
+    cell, kind = cells[name], {"theta": "R", "d": "P"}.get(name)
+    at, found = f"{where}, {name}", repr(texts[name])
+    if len(variables) > 1 or kind is None or _kind(fields.get("kind", kind), where).turns != (kind == "R"):
         raise InputError(
             "the joint variable belongs in theta of a revolute joint, or in d of a prismatic joint",
             where=at,
-            found=repr(written[name]),
+            found=found,
             remedy="write numbers without a variable into all other cells of the row",
         )
-    if cell.times not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
+    if cell.factor not in (1.0, -1.0) or cell.variable not in (None, index + 1) or "sense" in fields:
         raise InputError(
             f"the variable of row {index + 1} must be q{index + 1} or -q{index + 1}",
             where=at,
-            found=repr(written[name]),
+            found=found,
             remedy="for a mimic joint write mimic = {leader, multiplier, offset}",
         )
-    constant = f"{cell.number!r} {cell.unit or ''}"
-    return {"kind": kind, **fields, name: constant, "sense": cell.times}
+    return {"kind": kind, **fields, name: cell.constant, "sense": cell.factor}
 
 
 def units_in(cell: Cell, units: Units) -> Units:
@@ -235,10 +246,10 @@ def units_in(cell: Cell, units: Units) -> Units:
     return units_of(cell.unit or units.angles, units.lengths, units.digits)
 
 
-def _read(text: str, where: str) -> Cell:
+def _parse_cell(text: str, where: str) -> Cell:
     try:
-        return cell_of(text)
-    except NoCellError as error:
+        return parse_cell(text)
+    except InvalidCellError as error:
         raise InputError(
             "this is not a number",
             where=where,
@@ -249,23 +260,22 @@ def _read(text: str, where: str) -> Cell:
 
 def _cell(name: str, value: Any, units: Units, where: str) -> float:
     """Parse a cell into metres or radians; an angle in radians that exceeds one turn is an error."""
-    in_pi = False
+    is_length, at, unit = name in ("a", "d"), f"{where}, {name}", None
     if isinstance(value, str):
-        cell = _read(value, f"{where}, {name}")
-        number, in_pi = cell.number, cell.unit == "rad"
-        if cell.unit is not None:
-            if (cell.unit in ("m", "mm")) != (name in ("a", "d")):
-                kind = "a length" if name in ("a", "d") else "an angle"
-                raise InputError(f"{name} must be {kind}", where=f"{where}, {name}", found=repr(value))
+        cell = _parse_cell(value, at)
+        number, unit = cell.number, cell.unit
+        if unit is not None:
+            if (unit in ("m", "mm")) != is_length:
+                kind = "a length" if is_length else "an angle"
+                raise InputError(f"{name} must be {kind}", where=at, found=repr(value))
             units = units_in(cell, units)
     else:
-        number = read_number(value, f"{where}, {name}")
-    if name in ("a", "d"):
-        return cell_in_si(name, number, units)
-    if not in_pi and units.angles is Angles.RADIANS and abs(number) > 2.0 * math.pi:
+        number = read_number(value, at)
+    may_be_degrees = not is_length and unit is None and units.angles is Angles.RADIANS
+    if may_be_degrees and abs(number) > 2.0 * math.pi:
         raise InputError(
             f"{name} is more than one turn in radians",
-            where=f"{where}, {name}",
+            where=at,
             found=repr(value),
             remedy="write angles = 'degrees' if the table's angles are degrees",
         )
@@ -296,8 +306,8 @@ def _sense(value: Any, where: str) -> int:
     return int(number)
 
 
-def _own(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    """Parse a value of a joint's variable: an angle for a revolute joint, a length for a prismatic joint."""
+def _joint_value(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
+    """Parse a value of the joint's variable: an angle if the joint is revolute, otherwise a length."""
     number = read_number(value, f"{where}, {name}")
     return cell_in_si("theta" if _kind(fields.get("kind", "R"), where).turns else "d", number, units)
 
@@ -309,11 +319,11 @@ def _mimic(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> M
         raise InputError(
             "`mimic` must have the form {leader, multiplier, offset}", where=where, found=repr(value)
         )
-    check_keys(value, ("leader", "multiplier", "offset"), "mimic", where)
+    check_keys(value, _MIMIC_KEYS, "mimic", where)
     return Mimic(
         name_of(value["leader"], f"{where}, leader"),
         read_number(value.get("multiplier", 1.0), f"{where}, multiplier"),
-        _own("offset", value.get("offset", 0.0), fields, units, where),
+        _joint_value("offset", value.get("offset", 0.0), fields, units, where),
     )
 
 
@@ -324,9 +334,9 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
         raise InputError(
             "`limit` must have the form {lower, upper, velocity, effort}", where=where, found=repr(value)
         )
-    check_keys(value, ("lower", "upper", "velocity", "effort"), "limit", where)
+    check_keys(value, LIMIT_KEYS, "limit", where)
     lower, upper, velocity = (
-        _own(name, value[name], fields, units, where) if name in value else default
+        _joint_value(name, value[name], fields, units, where) if name in value else default
         for name, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))
     )
     if lower > upper:
@@ -337,14 +347,6 @@ def _limit(value: Any, fields: Mapping[str, Any], units: Units, where: str) -> L
         )
     effort = read_number(value["effort"], f"{where}, effort") if "effort" in value else math.inf
     return Limit(lower, upper, velocity, effort)
-
-
-_TABLE_KEYS = (
-    *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
-    *("coordinates", "rows"),
-)
-#: These keys, for example the source of the numbers, do not change the table.
-NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 
 
 def table_from_rows(
@@ -368,13 +370,12 @@ def table_from_rows(
         convention: "standard" or "modified".
         angles: "radians" or "degrees".
         lengths: "metres" or "millimetres".
-        base: (4, 4) or (3, 4) T_base_0, with lengths in `lengths`; the identity when None.
-        tool: (4, 4) or (3, 4) pose T_n_tip of the tip in frame n, with lengths in the unit `lengths`. None:
-            the identity.
+        base: (4, 4) or (3, 4) T_base_0, with positions in the unit `lengths`; the identity when None.
+        tool: (4, 4) or (3, 4) T_n_tip, with positions in the unit `lengths`; the identity when None.
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
-        coordinates: Names of mimicked joints that have no row because they are in another part of the robot.
+        coordinates: Names of mimicked joints that have no row because they are not on the path.
 
     Raises:
         InputError: the convention or a unit is unknown, a row is invalid, there are no rows, or one joint has
@@ -397,12 +398,12 @@ def table_from_rows(
             found="[]",
             remedy="write a row for each moving joint",
         )
-    refuse_other_order(rows)
-    made = tuple(written_row(row, i, units) for i, row in enumerate(rows))
-    _check_leaders(made, coordinates)
+    _check_order(rows)
+    parsed = tuple(parse_row(row, i, units) for i, row in enumerate(rows))
+    _check_leaders(parsed, coordinates)
     return DHTable(
         convention_of(convention),
-        made,
+        parsed,
         _pose(base, "base", units),
         _pose(tool, "tool", units),
         name_of(robot, "robot"),
@@ -412,9 +413,9 @@ def table_from_rows(
 
 
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
-    """Make a table from a mapping in the form that the module's docstring shows.
+    """Make a table from a mapping with the keys of a TOML file (`urdfkin.dh.rows` shows them).
 
-    InputError is raised without a convention, for an unknown key, and as in `table_from_rows`.
+    A missing convention or an unknown key raises InputError; other errors are as in `table_from_rows`.
     """
     if "convention" not in data:
         raise InputError(
@@ -422,7 +423,7 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
             remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
             question=QuestionsSection.WHICH_DH_CONVENTION,
         )
-    check_keys([key for key in data if key not in NOTES], _TABLE_KEYS, "a table")
+    check_keys([key for key in data if key not in _NOTES], _TABLE_KEYS, "a table")
     options = {key: data[key] for key in _TABLE_KEYS if key in data and key not in ("convention", "rows")}
     return table_from_rows(data.get("rows"), data["convention"], **options)
 
@@ -433,8 +434,8 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
         raise InputError(
             "`coordinates` must be a list of names", where="coordinates", found=repr(coordinates)
         )
-    leads = {row.joint for row in rows if row.mimic is None}
-    known = [*leads, *(name_of(name, "coordinates") for name in coordinates)]
+    independent = {row.joint for row in rows if row.mimic is None}
+    known = [*independent, *(name_of(name, "coordinates") for name in coordinates)]
     for i, row in enumerate(rows):
         if row.mimic is None or row.mimic.leader in known:
             continue
@@ -444,7 +445,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
                 "a joint cannot mimic a mimic joint",
                 where=where,
                 found=repr(row.mimic.leader),
-                remedy="name the joint that the mimicked joint itself mimics, and multiply both multipliers",
+                remedy=f"name the joint that {row.mimic.leader!r} mimics; multiply the multipliers",
             )
         error = UnknownNameError("joint", row.mimic.leader, known, where=where)
         error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"

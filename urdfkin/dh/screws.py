@@ -5,8 +5,7 @@
 M is the tip's pose in the zero configuration. A screw is (w, v), with the **angular part first**, as in that
 book and in its code. For a revolute joint through p, w is the unit axis and v = p x w. For a prismatic joint,
 w = 0 and v is the unit direction. Space screws S are in the base frame, body screws B = Ad(M^-1) S in the tip
-frame. The author of a Denavit-Hartenberg table can choose some of its frames. Screws are unique: the base
-frame, the tip frame and the joint zeros define all numbers.
+frame.
 """
 
 from __future__ import annotations
@@ -19,10 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urdfkin.dh.convert import UNBOUNDED_SLIDE
+from urdfkin.dh.convert import UNBOUNDED_SLIDE, serial_tree
+from urdfkin.dh.export.text import pose_matrix
 from urdfkin.dh.rows import check_keys
 from urdfkin.errors import InputError
-from urdfkin.errors.display import Displayable, Table, TextDocument
+from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, six_digits
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.kinematics.rotation import ROUNDED, axis_aligning, polar_factor
@@ -38,13 +38,13 @@ from urdfkin.model.tree import (
     KinematicTree,
     Limit,
     Mimic,
-    build_tree,
     frozen,
     pose,
 )
 
-#: The length of a handwritten axis may differ by this number from 1, and its pitch (m/rad) from 0.
+#: Largest deviation of the length of a handwritten axis from 1, and of its pitch (m/rad) from 0.
 _WRITTEN = 1e-4
+_FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,19 +87,7 @@ class ProductOfExponentials(Displayable):
         return log_line(f"<ProductOfExponentials {path}, {len(self.joints)} joints>")
 
     def _sheet(self) -> TextDocument:
-        names = [joint.name for joint in self.joints]
-        parts: list[str | Table] = [
-            "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn)"
-        ]
-        for words, rows in (("Space screws S", self.space), ("Body screws B", self.body)):
-            cells = [(name, *row) for name, row in zip(names, rows.tolist(), strict=True)]
-            heads = ("joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
-            parts += [f"{words}, angular part first (1, m):", Table(heads, cells)]
-        pose_rows = [(axis, *row) for axis, row in zip("xyz", self.M[:3].tolist(), strict=True)]
-        columns = (f"axis of {self.base_frame}", "x of tip", "y of tip", "z of tip", "position [m]")
-        parts += ["M, the pose of the tip in the zero configuration:", Table(columns, pose_rows)]
-        title = f"{self.robot}: {self.base_frame} to {self.tip_frame}, product of exponentials"
-        return TextDocument(title, parts)
+        return screws_document(self, digits=6)
 
     @cached_property
     def body(self) -> FloatArray:
@@ -159,7 +147,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The product of exponentials as a path: each joint is a rotation or translation along a z axis.
+        """The product of exponentials as a path of rotations about, or translations along, z axes.
 
         For a revolute joint, exp([S] q) = A Rz(q) A^-1. For a prismatic joint, exp([S] q) = A Tz(q) A^-1. The
         z axis of the pose A is along the joint's axis. The constant pose between two motions is A_i^-1
@@ -181,9 +169,8 @@ class ProductOfExponentials(Displayable):
     def roundings(self) -> float:
         """Bound of the rotation error that rounding causes in `placement`, in machine epsilons.
 
-        The bound does not contain the effect of rounding in q.
-
-        The bound is twice the bound for a Denavit-Hartenberg table of the same path.
+        The bound is twice the bound for a Denavit-Hartenberg table of the same path, and does not contain the
+        effect of rounding in q.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
@@ -202,36 +189,33 @@ class ProductOfExponentials(Displayable):
         """
         values = np.abs(self.coupling.values(q))
         turns = np.array([joint.kind.turns for joint in self.joints], dtype=bool)
-        way = np.vstack([np.zeros(3), self.points, self.M[:3, 3]])
-        length = 2.0 * float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+        points = np.vstack([np.zeros(3), self.points, self.M[:3, 3]])
+        length = 2.0 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         lever = length + values[..., ~turns].sum(axis=-1)
         return np.asarray(EPS * (self.roundings + values[..., turns].sum(axis=-1)) * lever)
 
     def to_tree(self) -> KinematicTree:
         """Return the path as a kinematic tree.
 
-        In the zero configuration each link frame is parallel to the base frame. The origin of the link frame
-        is on the axis of the link's joint.
+        In the zero configuration each link frame is parallel to the base frame, with its origin on the axis
+        of the link's joint.
 
         >>> import urdfkin
         >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
         >>> screws.to_tree().links
         ('base', 'joint_1_link', 'joint_2_link', 'tip')
         """
-        links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints)]
-        joints, here = list[tuple[Joint, str, str]](), np.zeros(3)
-        for i, (joint, screw, point) in enumerate(zip(self.joints, self.space, self.points, strict=True)):
+        links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints), self.tip_frame]
+        joints, origin = list[Joint](), np.zeros(3)
+        for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
             limit = joint.limit if joint.kind.turns else joint.limit or UNBOUNDED_SLIDE
             axis = screw[:3] if joint.kind.turns else screw[3:]
-            T = pose(p=point - here)
-            joints.append(
-                (Joint(joint.name, joint.kind, 0, T, axis, limit, joint.mimic), links[i], links[i + 1])
-            )
-            here = point
-        end = Joint(
-            f"{self.tip_frame}_fixed", JointKind.FIXED, 0, pose(p=-here) @ self.M, np.array([1.0, 0, 0])
-        )
-        return build_tree(self.robot, self.base_frame, [*joints, (end, links[-1], self.tip_frame)])
+            T = pose(p=point - origin)
+            joints.append(Joint(joint.name, joint.kind, 0, T, axis, limit, joint.mimic))
+            origin = point
+        T_tip, axis = pose(p=-origin) @ self.M, np.array([1.0, 0.0, 0.0])
+        joints.append(Joint(f"{self.tip_frame}_fixed", JointKind.FIXED, 0, T_tip, axis))
+        return serial_tree(self.robot, links, joints)
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the screws as plain data for `screws_of_mapping`, without mimic rules and limits.
@@ -252,6 +236,20 @@ class ProductOfExponentials(Displayable):
         }
 
 
+def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocument:
+    parts: list[str | Table | Matrix] = [CodeLine(_FORMULA)]
+    heads = ("i", "joint", "w_x", "w_y", "w_z", "v_x", "v_y", "v_z")
+    for title, rows in (("space screws S", screws.space), ("body screws B", screws.body)):
+        cells = [
+            (str(i), joint.name, *(six_digits(x, digits=digits) for x in row))
+            for i, (joint, row) in enumerate(zip(screws.joints, rows, strict=True), 1)
+        ]
+        parts += ["", title, Table(heads, cells, left=(1,), names=(1,))]
+    parts += ["", "M, the tip in the zero configuration (metres):", pose_matrix(screws.M, digits), ""]
+    path = f"{screws.robot}: {screws.base_frame} to {screws.tip_frame}"
+    return TextDocument(f"{path}, product of exponentials (metres, angular first)", parts)
+
+
 def screws_of(path: FrameChain) -> ProductOfExponentials:
     """Return the screws of a robot's path in the zero configuration."""
     frames, rows = path.path.frames(np.zeros(len(path.joints)))[::2], list[FloatArray]()
@@ -264,7 +262,7 @@ def screws_of(path: FrameChain) -> ProductOfExponentials:
 
 
 def _rigid(M: FloatArray) -> FloatArray:
-    """Return the rigid transform nearest to a handwritten zero pose; leave an exact pose unchanged."""
+    """Return the rigid transform nearest to a handwritten zero pose; an exact pose is unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]
@@ -288,10 +286,15 @@ def screws_from(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
-    `screws` (n, 6) has a row (w, v) for each joint, with the angular part first. An array (6, n) with a
-    column for each joint, as in Modern Robotics, is also accepted if n is not six. `M`, (4, 4) or (3, 4), is
-    the pose of the tip in the zero configuration (metres). The screws are in the base frame (`frame` is
-    "space") or in the tip frame ("body"). By default, the joints are called joint_1, joint_2, ...
+    Args:
+        screws: (n, 6) a row (w, v) for each joint, with the angular part first. An array (6, n) with a column
+            for each joint, as in Modern Robotics, is also accepted if n is not six.
+        M: (4, 4) or (3, 4) pose of the tip in the zero configuration (metres).
+        frame: Frame of the screws: "space" (the base) or "body" (the tip).
+        joints: Names of the joints; joint_1, joint_2, ... by default.
+        robot: The robot's name.
+        base_frame: Name of the base frame.
+        tip_frame: Name of the tip frame.
 
     Raises:
         InputError: an array has a wrong shape, the length of an axis is not 1, or a screw has a pitch (w . v
@@ -299,25 +302,25 @@ def screws_from(
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
-    home = np.asarray(M, dtype=np.float64)
-    if S.ndim != 2 or S.shape[1] != 6 or home.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
+    T = np.asarray(M, dtype=np.float64)
+    if S.ndim != 2 or S.shape[1] != 6 or T.shape not in ((4, 4), (3, 4)) or frame not in ("space", "body"):
         raise InputError(
             "screws must have the shape (n, 6), with a zero pose M (4, 4) and the frame `space` or `body`",
-            found=f"{S.shape}, {home.shape}, {frame!r}",
+            found=f"{S.shape}, {T.shape}, {frame!r}",
         )
-    if not (np.isfinite(S).all() and np.isfinite(home).all()):
+    if not (np.isfinite(S).all() and np.isfinite(T).all()):
         raise InputError("screws and M must be finite numbers", found="nan or inf")
-    pose = _rigid(home)
+    T = _rigid(T)
     if frame == "body":
-        w = S[:, :3] @ pose[:3, :3].T
-        S = np.hstack([w, S[:, 3:] @ pose[:3, :3].T + np.cross(pose[:3, 3], w)])
+        w = S[:, :3] @ T[:3, :3].T
+        S = np.hstack([w, S[:, 3:] @ T[:3, :3].T + np.cross(T[:3, 3], w)])
     names = tuple(joints) or tuple(f"joint_{i + 1}" for i in range(len(S)))
     if len(names) != len(S):
         raise InputError(
             "the number of names and the number of screws differ",
             found=f"{len(names)} names, {len(S)} screws",
         )
-    made = []
+    named = []
     for i, name in enumerate(names):
         turns = bool(S[i, :3].any())
         size = float(np.linalg.norm(S[i, :3] if turns else S[i, 3:]))
@@ -332,22 +335,21 @@ def screws_from(
         pitch = float(S[i, :3] @ S[i, 3:])
         if abs(pitch) > _WRITTEN:
             raise InputError(
-                "the screw of a joint must be a pure rotation or a pure translation", where=f"screw {i + 1}",
-                found=f"a pitch of {pitch:.3g} m/rad", remedy="make w . v = 0 for a revolute joint",
-            )  # fmt: skip
+                "the screw of a joint must be a pure rotation or a pure translation",
+                where=f"screw {i + 1}",
+                found=f"a pitch of {pitch:.3g} m/rad",
+                remedy="make w . v = 0 for a revolute joint",
+            )
         S[i, 3:] -= pitch * S[i, :3]
-        made.append(ScrewJoint(name, JointKind.CONTINUOUS if turns else JointKind.PRISMATIC))
-    return ProductOfExponentials(tuple(made), frozen(pose), frozen(S), robot, base_frame, tip_frame)
+        named.append(ScrewJoint(name, JointKind.CONTINUOUS if turns else JointKind.PRISMATIC))
+    return ProductOfExponentials(tuple(named), frozen(T), frozen(S), robot, base_frame, tip_frame)
 
 
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
-    """Make screws from a file's plain data, with the keys M and space or body.
-
-    The errors are those of `screws_from`, and InputError for an unknown key or without space and body.
-    """
+    """Make screws from a file's plain data, with the keys M and space or body; errors as in `screws_from`."""
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
     check_keys(data, known, "the table of screws")
-    frame = next((one for one in ("space", "body") if one in data), None)
+    frame = next((key for key in ("space", "body") if key in data), None)
     if frame is None:
         raise InputError(
             "no screws", where="space", remedy="write space = [[w, v], ...], or body = [[w, v], ...]"

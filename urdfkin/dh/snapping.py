@@ -1,15 +1,13 @@
 """Snap angles to multiples of 15 degrees, and state the effect on the tip.
 
-A file may write an angle inexactly (1.5708), or a calibration may have changed it slightly. Three angles are
-snapped, from base to tip:
+Three kinds of angles are snapped:
 
-1. the orientation of each joint's origin in the URDF (roll, pitch and yaw);
+1. roll, pitch and yaw of each joint's origin in the URDF;
 2. the tilt between consecutive axes, and the rotations before and after it;
-3. the angle theta of each row, after the rows are computed.
+3. theta of each row of the derived table.
 
-The positions of joint origins are not changed. Therefore, each change of an angle only rotates the rest of
-the chain about a joint's origin. From these rotations, `urdfkin.dh.table` derives a bound of the effect on
-the tip.
+The positions of the joints' origins do not change. A changed angle therefore only rotates the rest of the
+chain about a joint's origin, and `SnapReport` bounds the displacement of the tip.
 """
 
 from __future__ import annotations
@@ -20,7 +18,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.table import DHConvention, DHTable, SnapChange, SnapReport, nearest_twelfth, wrapped
+from urdfkin.dh.table import (
+    DHConvention,
+    DHTable,
+    SnapChange,
+    SnapReport,
+    angle_difference,
+    is_identity,
+    nearest_twelfth,
+    wrapped,
+)
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import real_number
 from urdfkin.kinematics.rotation import coordinate_rotation
@@ -29,14 +36,21 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: The largest tolerance is 5 degrees (in rad).
-#: With more than 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
+#: Largest tolerance of a snapped table: 5 degrees (in rad).
+#: Above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
-#: A snapped table is compared with the exact chain at this number of configurations.
+#: Number of configurations at which a rounded table is compared with the exact chain or table.
 SAMPLES = 500
+#: Assumed range (rad or metres) of a mimicked joint that is not on the path.
+_UNKNOWN_RANGE = (-1.0, 1.0)
+#: Largest deviation of an angle (rad) from a multiple of 15 degrees that `noisy_cells` reports.
+#: The largest length that `noisy_cells` reports is this number times the table's span.
+_LARGEST_NOISE = 1e-4
+#: Tolerances (rad) that `snap_hint` tries, in ascending order.
+_HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
-def checked_tolerance(snap: float) -> float:
+def check_tolerance(snap: float) -> float:
     """Return the tolerance (rad) as a float; raise InputError unless it is between 0 and 5 degrees."""
     tolerance = real_number(snap, "snap")
     if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
@@ -49,14 +63,11 @@ def checked_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the chain with snapped angles, and the list of changes.
-
-    Each entry of the list contains the index of a constant pose of the chain, and its change.
-    """
+    """Return the chain with snapped angles, and pairs of a constant pose's index and its change."""
     exact = chain(tree, tip, base)
-    rounder, moved = _snap_origins(tree, tolerance)
-    path = chain(rounder, tip, base)
-    changes = _changes_of_origins(steps_between(tree, tip, exact.base), moved)
+    snapped_tree, rotations = _snap_origins(tree, tolerance)
+    path = chain(snapped_tree, tip, base)
+    changes = _changes_of_origins(steps_between(tree, tip, exact.base), rotations)
     constants = list(path.constants)
     names = [*(joint.name for joint in path.joints), path.tip]
     for k, A in enumerate(constants):
@@ -75,50 +86,50 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
     rows, changes = list(table.rows), list[SnapChange]()
     for i, row in enumerate(rows):
         theta = wrapped(nearest_twelfth(row.theta)) + 0.0
-        angle = abs(math.remainder(row.theta - theta, 2.0 * math.pi))
+        angle = abs(angle_difference(row.theta, theta))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # The line of a prismatic axis may have been moved to the joint before it.
+            # The derivation may have shifted a prismatic axis to the previous joint's origin.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_change(exact, pivot, what, angle), row=i))
     return replace(table, rows=tuple(rows)), changes
 
 
-def statement(
+def snap_report(
     exact: FrameChain, table: DHTable, changes: Sequence[SnapChange], tolerance: float
 ) -> SnapReport:
-    """Return the sum of the bounds of all changes, and their largest effect in sampled configurations."""
-    radians = sum((change.angle for change in changes), 0.0)
     per_metre = dict[str, float]()
     for change in changes:
         for name in change.sliders:
             per_metre[name] = per_metre.get(name, 0.0) + change.angle
-    reached = {joint.name: travel(joint.limit) for joint in exact.joints}
+    travels = {row.joint: travel(row.limit) for row in table.rows}
     metres = sum((change.tip for change in changes), 0.0)
-    metres += sum(rate * reached[name] for name, rate in per_metre.items())
-    bounds = {one.name: axis_range(one.kind, one.limit) for one in exact.joints if one.mimic is None}
-    q = values_within([bounds.get(name, UNKNOWN) for name in exact.joint_names], SAMPLES)
+    metres += sum(rate * travels[name] for name, rate in per_metre.items())
+    q = samples_within_limits(table)
     T_exact, T_table = exact.placement(q), table.placement(q)
-    shift = np.linalg.norm(T_exact[:, :3, 3] - T_table[:, :3, 3], axis=-1)
-    turn = rotation_angle(T_exact[:, :3, :3], T_table[:, :3, :3])
+    distances = np.linalg.norm(T_exact[:, :3, 3] - T_table[:, :3, 3], axis=-1)
+    angles = rotation_angle(T_exact[:, :3, :3], T_table[:, :3, :3])
     return SnapReport(
         tolerance,
         tuple(sorted(changes, key=lambda change: change.row)),
         metres,
-        radians,
-        per_metre,
-        float(shift.max(initial=0.0)),
-        float(turn.max(initial=0.0)),
-        SAMPLES,
+        radians=sum((change.angle for change in changes), 0.0),
+        per_metre=per_metre,
+        measured_metres=float(distances.max(initial=0.0)),
+        measured_radians=float(angles.max(initial=0.0)),
+        samples=SAMPLES,
     )
 
 
-def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
-    """Return the (...,) angles between rotations (..., 3, 3) in radians.
+def samples_within_limits(table: DHTable) -> FloatArray:
+    """Return `SAMPLES` random configurations of a table."""
+    ranges = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
+    return values_within([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SAMPLES)
 
-    The formula |R - S| = 2 sqrt2 sin(angle / 2) is also accurate for small angles.
-    """
+
+def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
+    """Return the (...,) angles (rad) between rotations (..., 3, 3): |R - S| = 2 sqrt2 sin(angle / 2)."""
     chord = np.linalg.norm(R - S, axis=(-2, -1)) / (2.0 * math.sqrt(2.0))
     return np.asarray(2.0 * np.arcsin(np.minimum(chord, 1.0)))
 
@@ -127,11 +138,8 @@ def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
 
 
 def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree, dict[str, float]]:
-    """Snap roll, pitch and yaw of all joint origins.
-
-    The second result is the angle (rad) by which the origin of each changed joint rotated.
-    """
-    joints, moved = list(tree.joints), dict[str, float]()
+    """Snap roll, pitch and yaw of all joint origins; also return the angle by which each origin rotated."""
+    joints, rotations = list(tree.joints), dict[str, float]()
     for i, joint in enumerate(joints):
         T = np.array(joint.T_parent_joint)
         T[:3, :3] = _round_rotation(T[:3, :3], tolerance)
@@ -139,8 +147,8 @@ def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree,
         if angle > 0.0:
             joints[i] = replace(joint, T_parent_joint=T)
         if angle > TURN * EPS:
-            moved[joint.name] = angle
-    return replace(tree, joints=tuple(joints)), moved
+            rotations[joint.name] = angle
+    return replace(tree, joints=tuple(joints)), rotations
 
 
 def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
@@ -155,10 +163,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Factor the rotation of a pose into Rz(phi) Rx(tilt) Rz(psi), and snap each of the three angles.
-
-    The position of the pose is unchanged. The result also contains the angle by which the rotation changed.
-    """
+    """Snap the angles in Rz(phi) Rx(tilt) Rz(psi), the rotation of a pose; also return the changed angle."""
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
@@ -192,7 +197,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
 
 
 def _changes_of_origins(
-    steps: Sequence[tuple[Joint, bool]], moved: Mapping[str, float]
+    steps: Sequence[tuple[Joint, bool]], rotations: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
     """Return a change for each snapped origin; `lever` is the path length from it to the tip."""
     changes, lever, sliders = list[tuple[int, SnapChange]](), 0.0, list[str]()
@@ -202,7 +207,7 @@ def _changes_of_origins(
         slides = joint.kind is JointKind.PRISMATIC
         lever += offset if backwards else 0.0
         sliders += [joint.name] if slides and not backwards else []
-        if angle := moved.get(joint.name, 0.0):
+        if angle := rotations.get(joint.name, 0.0):
             before = moving - (joint.kind.has_axis and not backwards)
             change = SnapChange(0, f"origin of {joint.name}", angle, lever, tuple(reversed(sliders)))
             changes.append((before, change))
@@ -213,11 +218,7 @@ def _changes_of_origins(
 
 
 def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Return a change that rotates the rest of the chain about the origin of joint k.
-
-    Joints are counted from 1; n + 1 is the tip. The attribute `lever` of the change is the largest possible
-    distance from this origin to the tip.
-    """
+    """Return a change that rotates the chain after joint k about its origin; joint 1 is the first joint."""
     sliders = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), sliders)
 
@@ -228,12 +229,8 @@ def row_of_constant(table: DHTable, k: int) -> int:
     if k == 0:
         return -1
     if k == n:
-        return n - 1 if np.array_equal(table.tool, np.eye(4)) else n
+        return n - 1 if is_identity(table.tool) else n
     return k - 1 if table.convention is DHConvention.STANDARD else k
-
-
-#: A mimicked joint that is not on the path is assumed to be in this range (rad or metres).
-UNKNOWN = (-1.0, 1.0)
 
 
 def travel(limit: Limit | None) -> float:
@@ -241,52 +238,40 @@ def travel(limit: Limit | None) -> float:
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
-#: `noisy_cells` finds angles that differ by at most this number (rad) from a multiple of 15 degrees.
-#: It finds lengths of at most this number times the table's span.
-LARGEST = 1e-4
-#: `snap_hint` tries these tolerances (rad) in ascending order.
-TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
-
-
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """Return (joint, cell, difference in rad or m) for each cell that nearly equals a round value.
+    """Return the angles near a multiple of 15 degrees, and the lengths near 0, as (joint, cell, deviation).
 
-    The round values are the multiples of 15 degrees for angles, and 0 for lengths. The cell with the smallest
-    difference is first.
+    The cell with the smallest deviation (rad or m) is first.
     """
-    found = []
+    noisy = []
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
-            off = abs(angle - nearest_twelfth(angle))
-            if ANGLE * EPS < off <= LARGEST:
-                found.append((row.joint, name, off))
+            deviation = abs(angle - nearest_twelfth(angle))
+            if ANGLE * EPS < deviation <= _LARGEST_NOISE:
+                noisy.append((row.joint, name, deviation))
         for name, length in (("a", row.a), ("d", row.d)):
-            if 0.0 < abs(length) <= LARGEST * table.span:
-                found.append((row.joint, name, abs(length)))
-    return sorted(found, key=lambda one: one[2])
+            if 0.0 < abs(length) <= _LARGEST_NOISE * table.span:
+                noisy.append((row.joint, name, abs(length)))
+    return sorted(noisy, key=lambda cell: cell[2])
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Return a hint about cells that nearly equal a multiple of 15 degrees or zero, in one line of text.
+    """Return a line that recommends the tolerance with the fewest noisy cells; None if no tolerance helps.
 
-    For example, an angle that the file rounds (1.5708) may cause a tilt of 5e-12 rad and offsets of about
-    1e-12 m. They are larger than rounding errors of the computation, so the table contains them. The hint
-    names one of these cells. It also recommends a tolerance from `TOLERANCES`: the tolerance after which the
-    fewest cells nearly equal a round value. The result is None if no cell nearly equals a round value, or if
-    no tolerance reduces the number of these cells. `snapped` takes a tolerance (rad), and returns the exact
-    `table` with angles rounded to multiples of 15 degrees.
+    A noisy cell is the effect of an angle that the file rounds: 1.5708 may cause a tilt of 5e-12 rad and
+    offsets of about 1e-12 m. `snapped` returns the table that is snapped with a tolerance (rad).
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:
         return None
-    left = {tolerance: len(noisy_cells(snapped(tolerance))) for tolerance in TOLERANCES}
-    best = min(TOLERANCES, key=lambda tolerance: left[tolerance])
-    if left[best] >= len(noisy):
+    counts = {tolerance: len(noisy_cells(snapped(tolerance))) for tolerance in _HINT_TOLERANCES}
+    best = min(counts, key=lambda tolerance: counts[tolerance])
+    if counts[best] >= len(noisy):
         return None
     joint, cell, size = noisy[0]
     unit = "m" if cell in ("a", "d") else "rad"
-    many = f"{len(noisy)} cells look" if len(noisy) > 1 else "a cell looks"
+    subject = f"{len(noisy)} cells look" if len(noisy) > 1 else "a cell looks"
     return (
-        f"{many} like the effect of rounded angles in the file ({cell} of {joint}: {size:.2g} {unit}):"
-        f" --snap {best:.0e} leaves {left[best] or 'none'} of them and reports the effect on the tip"
+        f"{subject} like the effect of rounded angles in the file ({cell} of {joint}: {size:.2g} {unit}):"
+        f" with --snap {best:.0e}, {counts[best] or 'none'} of them remain; the effect on the tip is printed"
     )

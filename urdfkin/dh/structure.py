@@ -1,29 +1,20 @@
 """Find the structure of an arm and export it for closed-form inverse kinematics solvers.
 
-The distance and the angle of two consecutive axes are the same in every configuration. Therefore,
-`structure` computes them only in the zero configuration, from the screws (`urdfkin.dh.screws`). Pinocchio
-checks the screws. Pieper (1968): six revolute joints have a closed-form solution if three consecutive axes
-are parallel or intersect in one point. A calibrated robot has such a property only approximately. The
-deviation is given in radians and metres.
+Six revolute joints have a closed-form solution if three consecutive axes are parallel or intersect in one
+point (Pieper, 1968). A calibrated robot has such a property only approximately. Distances and angles of
+consecutive axes are the same in every configuration, so they are computed in the zero configuration.
 
 `opw_of` returns the seven parameters of an ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et
 al., 2014). An OPW arm is the standard table
 
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
-with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF (`urdfkin.dh.make`). The
-frames, the zero positions and the positive directions of the joints are the same as in the OPW table. The OPW
-parameters are read from the derived table. OPW has no parameter for the small tilts of a calibrated arm, so
-`opw_of` ignores these tilts. The error of the OPW parameters is the difference between the pose by
-`Opw.placement` and the pose that urdfkin computes for the arm.
+with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF with the frames of an OPW
+table, and reads the parameters from it. OPW has no parameter for the small tilts of a calibrated arm.
 
-`axes_and_steps` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
+`axes_and_vectors` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
-    T(q) = P_0 + R(h_1, q_1) (P_1 + R(h_2, q_2) (P_2 + ... + P_n)),    R(q) = R(h_1, q_1) ... R(h_n, q_n) R_6T
-
-P_i is the vector from a point on axis i to a point on axis i + 1. The formula is correct for any choice of
-these points. If two axes intersect, this module chooses the intersection for both of them. The vector between
-the two points is then zero, and the solvers use a zero vector to detect the intersection.
+    p(q) = P_0 + R(h_1, q_1) (P_1 + R(h_2, q_2) (P_2 + ... + P_n)),    R(q) = R(h_1, q_1) ... R(h_n, q_n) R_6T
 """
 
 from __future__ import annotations
@@ -36,24 +27,31 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.dh.derive import Choices, Last, derive
+from urdfkin.dh.derive import Choices, derive
 from urdfkin.dh.make import derive_like, reversed_like
 from urdfkin.dh.screws import ProductOfExponentials
-from urdfkin.dh.table import DHConvention, DHRow, DHTable
+from urdfkin.dh.snapping import travel
+from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind
 
-#: `NEAR_ANGLE` (rad) and `NEAR_LENGTH` (metres) limit the deviations of a reported property.
-#: The property is exact if its deviations are at most `EXACT` (rad and metres).
-NEAR_ANGLE, NEAR_LENGTH, EXACT = 0.02, 0.005, 1e-9
-#: Singular values of the Jacobian below this limit are treated as zero.
-#: Rounding errors are far smaller, and the distances of real axes are far larger.
+#: Largest deviations (rad and metres) of a reported property.
+NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
+#: Largest deviation (rad and metres) of an exact property.
+EXACT = 1e-9
+#: Singular value below which the Jacobian loses rank; rounding errors are far smaller.
 _RANK = 1e-6
-#: The reach is estimated at this number of random configurations within the limits, without mimic rules.
+#: Number of random configurations from which the reach is estimated, within the limits, without mimic rules.
 _SAMPLES = 2000
+#: Default tolerance of `opw_of` (metres and rad).
+TOLERANCE = 1e-6
+#: Number of configurations at which `opw_of` computes the tip error.
+SAMPLES = 200
+_H = math.pi / 2.0
+_ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +96,8 @@ class Structure:
         joints: R or P for each joint.
         freedoms: Degrees of freedom of the tip: the Jacobian's rank at a random configuration.
         kinds: Exact and approximate properties; the property with the smallest deviation is first.
-        reach: Upper bound of the tip's distance (metres) from a point of the first axis. The point is the one
-            nearest to the second axis.
+        reach: Upper bound (metres) of the tip's distance from the point of the first axis that is nearest to
+            the second axis.
         reached: Largest distance of the tip from this point in sampled configurations (metres).
         solvers: Closed-form solutions, with libraries that implement them.
     """
@@ -152,24 +150,21 @@ def _pair(screws: ProductOfExponentials, i: int) -> AxisPair:
     distance = 0.0
     if screws.joints[i].kind.turns and screws.joints[i + 1].kind.turns:
         between = screws.points[i + 1] - screws.points[i]
-        across = (
-            np.linalg.norm(np.cross(z, between))
-            if angle < NEAR_ANGLE
-            else abs(cross @ between) / np.sin(angle)
-        )
-        distance = float(across)
+        is_parallel = angle < NEAR_ANGLE
+        normal = np.linalg.norm(np.cross(z, between)) if is_parallel else abs(cross @ between) / np.sin(angle)
+        distance = float(normal)
     return AxisPair(screws.joints[i].name, screws.joints[i + 1].name, angle, distance)
 
 
-def meeting(screws: ProductOfExponentials, at: tuple[int, ...]) -> tuple[FloatArray, float]:
+def intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
     """Return the point nearest to some axes in least squares, and its largest distance from them (m)."""
     A, b = np.zeros((3, 3)), np.zeros(3)
-    for i in at:
+    for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
         A, b = A + across, b + across @ screws.points[i]
     point = np.asarray(np.linalg.lstsq(A, b, rcond=_RANK)[0], np.float64)
-    off = [np.linalg.norm(np.cross(_axis(screws, i), point - screws.points[i])) for i in at]
-    return point, float(max(off))
+    distances = [np.linalg.norm(np.cross(_axis(screws, i), point - screws.points[i])) for i in indices]
+    return point, float(max(distances))
 
 
 # -- kinds ---------------------------------------------------------------------------------------------
@@ -185,11 +180,11 @@ def _triples(screws: ProductOfExponentials, letters: str, pairs: tuple[AxisPair,
         if tilt <= NEAR_ANGLE:
             found.append(StructureKind("three parallel axes", names, radians=tilt))
         elif min(pairs[i].angle, pairs[i + 1].angle) > NEAR_ANGLE:
-            point, off = meeting(screws, (i, i + 1, i + 2))
-            if off <= NEAR_LENGTH:
-                where = " wrist" if i == len(letters) - 3 else " shoulder" if i == 0 else " joint"
-                name = "spherical" + where
-                found.append(StructureKind(name, names, metres=off, at=tuple(float(x) for x in point)))
+            point, distance = intersection(screws, (i, i + 1, i + 2))
+            if distance <= NEAR_LENGTH:
+                place = "wrist" if i == len(letters) - 3 else "shoulder" if i == 0 else "joint"
+                at = tuple(point.tolist())
+                found.append(StructureKind(f"spherical {place}", names, metres=distance, at=at))
     return found
 
 
@@ -201,54 +196,47 @@ def _arm_kinds(
     if sorted(letters) == ["P", "R", "R", "R"] and tilt <= NEAR_ANGLE:
         return [StructureKind("SCARA", names, radians=tilt)]
     if letters[:3] == "PPP":
-        off = max(abs(float(_axis(screws, i) @ _axis(screws, k))) for i, k in ((0, 1), (1, 2), (0, 2)))
-        if off <= NEAR_ANGLE:
-            return [StructureKind("gantry", names[:3], radians=math.asin(off))]
+        sine = max(abs(float(_axis(screws, i) @ _axis(screws, k))) for i, k in ((0, 1), (1, 2), (0, 2)))
+        if sine <= NEAR_ANGLE:
+            return [StructureKind("gantry", names[:3], radians=math.asin(sine))]
     return []
 
 
 def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the known closed-form solutions.
-
-    If the arm has a property only approximately, the closed-form solution has a small error.
-    """
-    named = {kind.name for kind in kinds}
-    spherical = [kind for kind in kinds if kind.name in ("spherical wrist", "spherical shoulder")]
-    if letters == "R" * 7:
-        return (
-            ["7R with spherical shoulder and wrist: closed form for each elbow angle"]
-            if len(spherical) == 2
-            else []
-        )
+    """Return the known closed-form solutions; an approximate property gives an approximate solution."""
+    names = {kind.name for kind in kinds}
+    spherical = names & {"spherical wrist", "spherical shoulder"}
+    if letters == "R" * 7 and len(spherical) == 2:
+        return ["7R with spherical shoulder and wrist: closed form for each elbow angle"]
     if letters != "R" * 6:
         return []
-    found = []
-    square = [abs(pair.angle - math.pi / 2.0) <= NEAR_ANGLE for pair in pairs]
-    flat = [pair.angle <= NEAR_ANGLE for pair in pairs]
-    if "spherical wrist" in named and square[0] and flat[1] and all(square[2:]):
-        found.append("OPW (ortho-parallel basis, spherical wrist): opw_kinematics, rs-opw-kinematics")
-    meet = [pair.distance <= NEAR_LENGTH and pair.angle > NEAR_ANGLE for pair in pairs]
+    solutions = []
+    orthogonal = [abs(pair.angle - math.pi / 2.0) <= NEAR_ANGLE for pair in pairs]
+    parallel = [pair.angle <= NEAR_ANGLE for pair in pairs]
+    if "spherical wrist" in names and orthogonal[0] and parallel[1] and all(orthogonal[2:]):
+        solutions.append("OPW (ortho-parallel basis, spherical wrist): opw_kinematics, rs-opw-kinematics")
+    intersect = [pair.distance <= NEAR_LENGTH and pair.angle > NEAR_ANGLE for pair in pairs]
     if spherical:
-        ends = "_two_parallel" if flat[1] else "_two_intersecting" if meet[0] else ""
-        ik_geo = f", ik-geo's spherical{ends}" if "spherical wrist" in named else ""
-        found.append(f"Pieper, three axes meet: EAIK{ik_geo}")
-    if "three parallel axes" in named:
+        suffix = "_two_parallel" if parallel[1] else "_two_intersecting" if intersect[0] else ""
+        ik_geo = f", ik-geo's spherical{suffix}" if "spherical wrist" in names else ""
+        solutions.append(f"Pieper, three axes meet: EAIK{ik_geo}")
+    if "three parallel axes" in names:
         # ik-geo requires that axes 2, 3 and 4 are parallel and that axes 5 and 6 intersect.
-        ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if meet[4] else ''}"
-        solvers = ["EAIK"] * any(meet) + [ik_geo] * (flat[1] and flat[2])
+        ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if intersect[4] else ''}"
+        solvers = ["EAIK"] * any(intersect) + [ik_geo] * (parallel[1] and parallel[2])
         if solvers:
-            found.append(f"Pieper, three axes are parallel{', two meet' * any(meet)}: {', '.join(solvers)}")
-    return found
+            two_meet = ", two meet" * any(intersect)
+            solutions.append(f"Pieper, three axes are parallel{two_meet}: {', '.join(solvers)}")
+    return solutions
 
 
 # -- reach ---------------------------------------------------------------------------------------------
 
 
 def _origin(screws: ProductOfExponentials) -> FloatArray:
-    """Return the point of the first axis nearest to the second axis, if the first two joints are revolute.
+    """Return the point of the first axis that is nearest to the second axis.
 
-    If one of the two joints is prismatic, or if their axes are nearly parallel, the result is the first point
-    in `screws.points`.
+    If a joint is prismatic, or if the axes are nearly parallel, it is the first point in `screws.points`.
     """
     if not screws.joints:
         return np.zeros(3)
@@ -263,21 +251,20 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Return an upper bound of the tip's distance from a point of the first axis, in metres.
+    """Return an upper bound of the tip's distance (metres) from `origin`, a point of the first axis.
 
-    The bound is the length of the path along the joint axes and the common perpendiculars between them.
+    The bound is the length of the polygon from `origin` through the nearest point of each next axis.
     """
-    here, total = origin, 0.0
+    point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
         if not joint.kind.turns:
-            limit = joint.limit
-            total += max(abs(limit.lower), abs(limit.upper)) if limit else math.inf
+            total += travel(joint.limit) if joint.limit else math.inf
             continue
         z = _axis(screws, i)
-        foot = screws.points[i] + z * float(z @ (here - screws.points[i]))
-        total += float(np.linalg.norm(foot - here))
-        here = foot
-    return total + float(np.linalg.norm(screws.M[:3, 3] - here))
+        nearest = screws.points[i] + z * float(z @ (point - screws.points[i]))
+        total += float(np.linalg.norm(nearest - point))
+        point = nearest
+    return total + float(np.linalg.norm(screws.M[:3, 3] - point))
 
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
@@ -285,13 +272,6 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
     values = values_within(ranges, _SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
-
-
-#: `TOLERANCE` is the default tolerance of `opw_of` (metres and rad).
-#: `opw_of` computes the tip error at `SAMPLES` configurations.
-TOLERANCE, SAMPLES = 1e-6, 200
-_H = math.pi / 2.0
-_ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -360,86 +340,81 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
         raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
     q = values_within([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
-    wanted, best, reason = free.placement(q), None, ""
-    for guide in _candidate_tables(path):
+    expected, best, reason = free.placement(q), None, ""
+    for reference in _candidate_tables(path):
         try:
-            choices = Choices(flip=reversed_like(path, Choices(), guide))
+            choices = Choices(flip=reversed_like(path, Choices(), reference))
         except InputError as error:
             reason = reason or error.found or ""
             continue
-        found = _read(derive_like(path, choices, guide))
-        off = np.abs(found.placement(q) - wanted)
-        size = float(off[..., :3, 3].max()), float(off[..., :3, :3].max())
-        below = sum(found.lengths[name] < 0.0 for name in ("c1", "c2", "c3", "c4"))
-        rank = (max(size) > tolerance, below if max(size) <= tolerance else max(size), len(choices.flip))
+        opw = _parameters(derive_like(path, choices, reference))
+        errors = np.abs(opw.placement(q) - expected)
+        metres, radians = float(errors[..., :3, 3].max()), float(errors[..., :3, :3].max())
+        fails = max(metres, radians) > tolerance
+        negative = sum(opw.lengths[name] < 0.0 for name in ("c1", "c2", "c3", "c4"))
+        rank = (fails, max(metres, radians) if fails else negative, len(choices.flip))
         if best is None or rank < best[0]:
-            best = rank, size, found
+            best = rank, opw
+            reason = f"an error of {metres * 1e3:.3g} mm and {radians:.3g} rad at the tip"
     if best is None or best[0][0]:
-        if best is not None:
-            reason = f"an error of {best[1][0] * 1e3:.3g} mm and {best[1][1]:.3g} rad at the tip"
         raise InputError(
             "the arm is not ortho-parallel with a spherical wrist (OPW)",
             where=where,
             found=reason,
             remedy="run `urdfkin structure` to see the properties of the arm, or allow a larger tolerance",
         )
-    return best[2]
+    return best[1]
 
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
     """Yield OPW tables with the approximate lengths of the arm, for all signs of a1, a2 and b."""
-    rows = derive(path, Choices(last=Last.FLANGE)).rows
+    rows = derive(path, Choices(last="flange")).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
     b = abs(rows[1].d) + abs(rows[2].d)
     for one, two, three in product((1.0, -1.0), repeat=3):
         a = (one * a1, c2, two * a2, 0.0, 0.0, 0.0)
         d = (abs(rows[0].d) or 1.0, 0.0, three * b, abs(rows[3].d), 0.0, tip)
-        made = [
+        opw_rows = (
             DHRow(a[i], _ALPHA[i], d[i], _THETA[i], JointKind.REVOLUTE, joint.name)
             for i, joint in enumerate(path.joints)
-        ]
-        yield DHTable(DHConvention.STANDARD, tuple(made))
+        )
+        yield DHTable(DHConvention.STANDARD, tuple(opw_rows))
 
 
-def _read(table: DHTable) -> Opw:
+def _parameters(table: DHTable) -> Opw:
     """Return the OPW parameters of a table with the frames of the OPW table; other cells are ignored."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
-    offsets = (
-        math.remainder(zero - row.theta, 2.0 * math.pi) + 0.0 for zero, row in zip(_THETA, rows, strict=True)
-    )
+    offsets = (angle_difference(zero, row.theta) + 0.0 for zero, row in zip(_THETA, rows, strict=True))
     names, signs = tuple(row.joint for row in rows), tuple(row.sense for row in rows)
     return Opw(names, lengths, tuple(offsets), signs, table.base, table.tool)
 
 
-def axes_and_steps(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
+def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) between points on these axes, in metres.
 
-    All joints must be revolute. The first vector begins at the base, and the last vector ends at the tip.
+    All joints must be revolute. The first vector begins at the base, and the last vector ends at the tip. The
+    vector between two intersecting axes is zero, by which solvers detect the intersection.
     """
-    way = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
-    return screws.space[:, :3], np.diff(way, axis=0)
+    points = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
+    return screws.space[:, :3], np.diff(points, axis=0)
 
 
 def _points(screws: ProductOfExponentials) -> FloatArray:
     """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
 
-    If an axis has several intersections, the intersection of three axes has priority over the intersection of
-    two axes. Of several intersections of three axes, the intersection closest to the tip has priority.
+    Of several intersections of an axis, that of three axes has priority, and then that closest to the tip.
     """
-    points, taken, n = screws.points.copy(), set[int](), len(screws.joints)
+    points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):
         for i in reversed(range(n - size + 1)):
-            at = tuple(range(i, i + size))
-            if taken.isdisjoint(at) and _meet(screws, at):
-                points[list(at)] = meeting(screws, at)[0]
-                taken.update(at)
+            indices = tuple(range(i, i + size))
+            axes = screws.space[list(indices), :3]
+            sines = np.linalg.norm(np.cross(axes[:-1], axes[1:]), axis=-1)
+            point, distance = intersection(screws, indices)
+            if assigned.isdisjoint(indices) and sines.min() > NEAR_ANGLE and distance <= EXACT:
+                points[list(indices)] = point
+                assigned.update(indices)
     return points
-
-
-def _meet(screws: ProductOfExponentials, at: tuple[int, ...]) -> bool:
-    axes = screws.space[list(at), :3]
-    turned = np.linalg.norm(np.cross(axes[:-1], axes[1:]), axis=-1)
-    return bool(turned.min() > NEAR_ANGLE) and meeting(screws, at)[1] <= EXACT

@@ -1,12 +1,11 @@
 """Define the Denavit-Hartenberg table: rows, base and tool, in the standard or the modified convention.
 
-Section 7.5 of the textbook describes these tables. A table represents a product of transforms. The product
-alternates between two kinds of factors:
+A table represents a product of two kinds of transforms (section 7.5 of the textbook):
 
     S = Rz(theta) Tz(d)              about and along a joint's axis
     X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row
 
-The two conventions have the same factors, but group them differently into rows:
+The two conventions group these transforms differently into rows:
 
     standard   T_base_tip = base . S_1 X_1 . S_2 X_2 ... S_n X_n . tool        (X_i from row i)
     modified   T_base_tip = base . X_0 S_1 . X_1 S_2 ... X_{n-1} S_n . tool    (X_{i-1} from row i)
@@ -14,11 +13,6 @@ The two conventions have the same factors, but group them differently into rows:
 The variable of row i is theta_i for a revolute joint and d_i for a prismatic joint. The value of the variable
 is the constant in the row plus `sense` times the joint's value. The standard convention is the textbook's:
 z_{i-1} is the axis of joint i, and d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
-
-Snapping replaces angles by multiples of 15 degrees. A rotation by a small angle about a joint's origin moves
-the tip by at most that angle times the tip's distance from the origin. This distance is at most the path
-length: the sum of the constant offsets from that origin to the tip, plus the travel of the prismatic joints.
-The sum of the bounds of all changes is valid for every configuration (`SnapReport`).
 """
 
 from __future__ import annotations
@@ -52,7 +46,7 @@ class DHConvention(StrEnum):
 
 
 def convention_of(name: str) -> DHConvention:
-    """Return the convention of this name; raise InputError for an unknown name."""
+    """Return the convention with this name; raise InputError for an unknown name."""
     try:
         return DHConvention(name)
     except (ValueError, TypeError):
@@ -129,10 +123,8 @@ class DHRow:
     def foot(self) -> float:
         """Distance (metres) along the next axis to the common normal; 0 if `beta` is 0.
 
-        In a Hayati row, the x axis intersects the next joint's axis at the distance `a`. The angle `beta`
-        tilts the next joint's axis in the direction of x, and `alpha` tilts it normal to x. A row of four
-        parameters would use the common normal of the two axes. The distance begins where x intersects the
-        next joint's axis, and ends at the common normal. It is |a sin(beta)| / sin^2(tilt).
+        The x axis of a Hayati row intersects the next axis, but is not the common normal of the two axes. The
+        distance from this intersection to the common normal is |a sin(beta)| / sin^2(tilt).
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -165,8 +157,10 @@ class DHRow:
         return along_axis(self.theta, self.d)
 
 
-#: A handwritten angle may differ by this fraction of 15 degrees from a multiple of 15 degrees.
+#: Largest deviation of a handwritten angle from a multiple of 15 degrees, as a fraction of 15 degrees.
 _WRITTEN = 1e-3
+#: Largest error of a rotation matrix in a handwritten pose, which often has only seven digits.
+_TYPED = 1e-6
 
 
 def along_axis(theta: ArrayLike, d: ArrayLike) -> FloatArray:
@@ -194,18 +188,25 @@ def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
     )
 
 
-def as_step(T: FloatArray) -> tuple[float, float] | None:
+def as_a_and_alpha(T: FloatArray) -> tuple[float, float] | None:
     """Return (a, alpha) if a pose equals Tx(a) Rx(alpha), up to rounding of the rotation; else None.
 
-    >>> as_step(between_axes(0.5, math.pi))
+    >>> as_a_and_alpha(between_axes(0.5, math.pi))
     (0.5, 3.141592653589793)
     """
-    tilt = max(abs(T[0, 1]), abs(T[0, 2]))  # tilt of the x axis
-    if tilt > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
+    tilt_of_x = max(abs(T[0, 1]), abs(T[0, 2]))
+    if tilt_of_x > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
-    alpha = math.atan2(T[2, 1], T[2, 2])
-    twelfth = nearest_twelfth(alpha)
-    return float(T[0, 3]), wrapped(twelfth if abs(alpha - twelfth) <= ANGLE * EPS else alpha) + 0.0
+    return float(T[0, 3]), cleaned_angle(math.atan2(T[2, 1], T[2, 2]))
+
+
+def is_identity(T: FloatArray) -> bool:
+    return bool(np.array_equal(T, np.eye(4)))
+
+
+def angle_difference(first: float, second: float) -> float:
+    """Return first - second in [-pi, pi]: full turns are removed."""
+    return math.remainder(first - second, 2.0 * math.pi)
 
 
 def wrapped(angle: float) -> float:
@@ -214,12 +215,19 @@ def wrapped(angle: float) -> float:
     >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
     (True, True)
     """
-    turned = math.remainder(angle, 2.0 * math.pi)
-    return math.pi if turned <= -math.pi * (1.0 - EPS) else turned
+    equivalent = math.remainder(angle, 2.0 * math.pi)
+    return math.pi if equivalent <= -math.pi * (1.0 - EPS) else equivalent
+
+
+def cleaned_angle(angle: float) -> float:
+    """Return the equivalent angle in (-pi, pi], without rounding error if it is a multiple of pi/12."""
+    angle = wrapped(angle)
+    twelfth = nearest_twelfth(angle)
+    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
-    """Whether an angle looks like a handwritten multiple of 15 degrees other than 0, for example 1.571.
+    """Whether an angle is nearly a multiple of 15 degrees other than 0; `twelfth` is 15 degrees in its unit.
 
     >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
     (True, False, False, True)
@@ -237,14 +245,14 @@ class SnapChange:
     """One snapped angle, and the rotation of the chain that it causes.
 
     Attributes:
-        row: Index of the row that contains the angle, from 0. An angle in the base has the index -1. For an
-            angle in the tool, the index is the number of rows.
+        row: Index of the row that contains the angle, from 0; -1 is the base, and the number of rows is the
+            tool.
         what: The joint and the snapped quantity, as text.
         angle: Angle (rad) by which the change rotates the rest of the chain.
         lever: Largest distance (metres) of the tip from the origin about which the chain rotates, with the
             prismatic joints at zero.
-        sliders: Names of the prismatic joints between this origin and the tip. The travel of these joints
-            increases the distance.
+        sliders: Names of the prismatic joints between this origin and the tip; their travel increases the
+            distance.
     """
 
     row: int
@@ -262,6 +270,9 @@ class SnapChange:
 @dataclass(frozen=True, slots=True)
 class SnapReport:
     """All snapped angles of a table, and their effect on the tip.
+
+    Each change rotates the rest of the chain about a joint's origin. The tip moves by at most the angle times
+    its distance from this origin. The sum of these bounds is valid in every configuration.
 
     Attributes:
         tolerance: The requested tolerance (rad).
@@ -285,31 +296,22 @@ class SnapReport:
 
     @property
     def rows(self) -> tuple[int, ...]:
-        """Sorted indices of the changed rows, from 0.
-
-        The index -1 denotes the base, and an index equal to the number of rows denotes the tool.
-        """
+        """Sorted indices of the changed rows, as in `SnapChange`."""
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the (...,) guaranteed bound (metres) of the tip's displacement for prismatic joint values.
+        """Return the (...,) guaranteed bound (metres) of the tip's displacement.
 
-        `values` contains the values of the prismatic joints by the joints' names.
+        `values` contains the values of the prismatic joints by name.
         """
         at_zero = sum(change.tip for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)
 
 
-#: A rotation in a handwritten pose may have this error, because it often has only seven digits.
-_TYPED = 1e-6
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class DHTable(Displayable):
-    """A Denavit-Hartenberg table: it stores the rows and computes the pose of the tip.
-
-    `urdfkin.load` makes a robot from a table. `urdfkin.dh` computes the motion of a table and exports it.
+    """A Denavit-Hartenberg table of a path; `urdfkin.load` makes a robot from it.
 
     Attributes:
         convention: Standard or modified.
@@ -368,7 +370,7 @@ class DHTable(Displayable):
         return log_line(f"<DHTable {self.robot}: {ends}, {len(self.rows)} rows, {self.convention}>")
 
     def __str__(self) -> str:
-        return "\n".join(map(log_line, self._written("terminal", units_of()).split("\n")))
+        return "\n".join(map(log_line, self._in_form("terminal", units_of()).split("\n")))
 
     def to_markdown(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in Markdown, for a README or an issue.
@@ -386,7 +388,7 @@ class DHTable(Displayable):
         >>> print(table.to_markdown("degrees", "millimetres").splitlines()[6])
         | 1 | `joint_1` | 500 | 0 | 0 | q1 |
         """
-        return self._written("markdown", units_of(angles, lengths, digits))
+        return self._in_form("markdown", units_of(angles, lengths, digits))
 
     def to_latex(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in LaTeX (amsmath, booktabs, graphicx); arguments as in `to_markdown`.
@@ -396,7 +398,7 @@ class DHTable(Displayable):
         >>> "tabular" in table.to_latex()
         True
         """
-        return self._written("latex", units_of(angles, lengths, digits))
+        return self._in_form("latex", units_of(angles, lengths, digits))
 
     def to_html(self, angles: str = "radians", lengths: str = "metres", digits: int = 10) -> str:
         """Return the table in HTML, for a web page; arguments as in `to_markdown`.
@@ -406,9 +408,9 @@ class DHTable(Displayable):
         >>> "<table" in table.to_html()
         True
         """
-        return self._written("html", units_of(angles, lengths, digits))
+        return self._in_form("html", units_of(angles, lengths, digits))
 
-    def _written(self, form: str, units: Units) -> str:
+    def _in_form(self, form: str, units: Units) -> str:
         return str(hook("a table in a form")(self, form, units)).rstrip("\n")
 
     def _repr_html_(self) -> str:
@@ -435,9 +437,7 @@ class DHTable(Displayable):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the table's coordinates: the joints that are not mimic joints, in row order.
-
-        Mimicked joints are included.
+        """Names of the table's coordinates, in row order: the independent and the mimicked joints.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -474,10 +474,9 @@ class DHTable(Displayable):
     def rounding(self, q: Given) -> FloatArray:
         """Return a bound (...,) in metres for the position error that rounding causes in `placement(q)`.
 
-        To get a bound of the orientation error in radians, divide the result by `span`.
-
-        The position bound is the length of the chain times the sum of the rounding errors of the rows and of
-        their angles (`urdfkin.kinematics.roundings`).
+        The bound is the length of the chain times the sum of the rounding errors of the rows and of their
+        angles (`urdfkin.kinematics.roundings`). The bound divided by `span` is a bound of the orientation
+        error in radians.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -491,10 +490,9 @@ class DHTable(Displayable):
         return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
-        """Return bounds (...,), in m and rad, of the difference between the tip's poses of table and URDF.
+        """Return bounds (...,), in m and rad, of the difference between the tip's poses in table and URDF.
 
-        For an exact table these are the bounds of rounding errors. If angles of the table were snapped to
-        multiples of 15 degrees, the bounds include the effect of these changes.
+        The bounds cover rounding errors, and the effect of snapped angles if the table has any.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -534,18 +532,16 @@ class DHTable(Displayable):
 
     @cached_property
     def _path(self) -> Path:
-        """The table as a path: the base, then a motion and a constant pose for each row, then the tool.
+        """The table's path without the tool: the base, then a motion and a constant pose for each row.
 
-        In a modified table the constant pose of a row comes before the row's motion. The motion of a revolute
-        joint is a rotation by theta. The motion of a prismatic joint is a translation by d. The constant pose
-        of a row is the product of the transforms of all cells except the variable.
+        In a modified table the constant pose of a row comes before its motion.
         """
         steps: list[FloatArray | ElementaryMotion] = [self.base]
         for row in self.rows:
             motion = ElementaryMotion(2, row.kind.turns)
-            own = along_axis(0.0, row.d) if row.kind.turns else along_axis(row.theta, 0.0)
+            constant = along_axis(0.0, row.d) if row.kind.turns else along_axis(row.theta, 0.0)
             standard = self.convention is DHConvention.STANDARD
-            steps += [motion, own @ row.X] if standard else [row.X @ own, motion]
+            steps += [motion, constant @ row.X] if standard else [row.X @ constant, motion]
         return Path(tuple(steps))
 
     def placement(self, q: Given) -> FloatArray:

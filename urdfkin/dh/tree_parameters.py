@@ -1,18 +1,15 @@
 """Compute Khalil and Kleinfinger's parameters: one table for a whole tree.
 
 W. Khalil and J.-F. Kleinfinger, "A new geometric notation for open and closed-loop robots", ICRA 1986. Each
-link j has one frame. The axis z_j of this frame is along the axis of the link's own joint (proximal, as in
-the modified convention). The nearest moving link towards the root is the antecedent of link j; i = a(j) is
-its index. The pose of frame j in frame i is
+link j has one frame, whose axis z_j is along the axis of the link's own joint. The nearest moving link
+towards the root is the antecedent of link j; i = a(j) is its index. The pose of frame j in frame i is
 
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
 The common normal to the first moving child of link i defines x_i, so gamma and b of this child are zero. For
 a chain without branches, the table equals the modified Denavit-Hartenberg table; d is then a(i-1), and r is
-d(i). The number sigma is the joint's kind: 0 revolute (theta), 1 prismatic (r), 2 fixed. The row of a fixed
-joint contains all six numbers, so the frame of each fixed link is exact too. The angle beta is not part of
-the original notation. The angle beta is zero except between nearly parallel axes (Hayati). Without beta,
-nearly parallel axes would need offsets of kilometres.
+d(i). The angle beta is not part of the original notation. It is zero except between nearly parallel axes,
+which would otherwise need offsets of kilometres (Hayati).
 """
 
 from __future__ import annotations
@@ -26,18 +23,16 @@ import numpy as np
 from urdfkin.compiled.plan import turned
 from urdfkin.dh.common_normals import (
     AxisTransform,
-    NearParallel,
     PoseTolerance,
-    cleaned_angle,
+    check_lengths,
     cleaned_length,
-    demand_squares,
-    noise_of,
+    pose_tolerance,
     step_between,
     tilt_of,
 )
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
 from urdfkin.dh.export.text import added
-from urdfkin.dh.table import along_axis, between_axes
+from urdfkin.dh.table import along_axis, between_axes, cleaned_angle
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
@@ -88,12 +83,10 @@ class TreeParameters:
     """The table of a whole robot, with a row for each joint, including fixed joints.
 
     Attributes:
-        ways: (joints,) path length (metres) from the root to each joint, which is the sum of the URDF's
-            offsets.
-        T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row. The frame of
-            a row has z along the joint's axis and x along the common normal.
-        left_out: Largest sum (rad), over the paths from the root, of the tilts that are replaced by zero
-            because they are not larger than rounding errors (`urdfkin.dh.common_normals`).
+        ways: (joints,) path length (metres) from the root to each joint: the sum of the URDF's offsets.
+        T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
+        left_out: Largest sum (rad), over the paths from the root, of the tilts that are replaced by zero as
+            rounding errors (`urdfkin.dh.common_normals`).
     """
 
     robot: str
@@ -105,42 +98,38 @@ class TreeParameters:
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the moving joints that mimic no other joint, in the tree's order: the columns of `q`."""
+        """Names of the independent moving joints, in the tree's order: the columns of `q`."""
         return tuple(row.joint for row in self.rows if row.sigma < 2 and row.leader == row.joint)
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error of the poses on the longest path, in eps * reach.
-
-        All errors measured so far are smaller than this estimate. The estimate is not a proven bound, and
-        does not include Pinocchio's rounding errors.
-        """
-        deepest = max((len(self._way(j)) for j in range(len(self.rows))), default=0)
-        return of_rows(1 + deepest) + self.left_out / EPS
+        """Estimated rounding error of the poses on the longest path, in eps * reach; not a proven bound."""
+        longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
+        return of_rows(1 + longest) + self.left_out / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
-        """Return the (..., joints) path length from the root to each link at `q`, in metres.
+        """Return the (..., joints) path length (metres) from the root to each link at `q`.
 
         The result is the larger of the path lengths in the URDF and in the table.
         """
         values = np.abs(self._values(q))
-        slides = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
-        own = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
-        own = own + slides + np.linalg.norm(self.T_frame_link[:, :3, 3], axis=-1)
+        travel = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
+        lengths = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
+        lengths = lengths + travel + np.linalg.norm(self.T_frame_link[:, :3, 3], axis=-1)
         reach = np.zeros((*q.shape[:-1], len(self.rows)))
         for j in range(len(self.rows)):
-            way = self._way(j)
-            reach[..., j] = np.maximum(
-                own[..., way].sum(axis=-1), self.ways[j] + slides[..., way].sum(axis=-1)
-            )
+            path = self._path(j)
+            in_urdf = self.ways[j] + travel[..., path].sum(axis=-1)
+            reach[..., j] = np.maximum(lengths[..., path].sum(axis=-1), in_urdf)
         return reach
 
-    def _way(self, j: int) -> list[int]:
-        way = []
+    def _path(self, j: int) -> list[int]:
+        """Return the indices of the rows from row j to the root."""
+        path = []
         while j >= 0:
-            way.append(j)
+            path.append(j)
             j = self.rows[j].antecedent
-        return way
+        return path
 
     def _values(self, q: FloatArray) -> FloatArray:
         """Return the (..., joints) values of all joints; zero for fixed joints."""
@@ -154,8 +143,7 @@ class TreeParameters:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the poses (..., joints, 4, 4) of the URDF frames of all links in the root frame.
 
-        `q` (..., coordinates) has the order of `coordinates`; another number of coordinates raises
-        InputError.
+        `q` (..., coordinates) is in the order of `coordinates`. Another length raises InputError.
         """
         q = np.asarray(q, dtype=np.float64)
         if q.shape[-1:] != (len(self.coordinates),):
@@ -179,7 +167,7 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
         InputError: the robot has a planar or floating joint, which has no single axis.
         RangeError: the square of a length is outside the range of doubles.
     """
-    demand_squares(tree.joints)
+    check_lengths(tree.joints)
     for joint in tree.joints:
         if joint.kind not in _SIGMA:
             raise InputError(
@@ -188,18 +176,19 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
                 remedy="load the robot without root_joint, or derive tables of the paths on either side"
                 " of this joint",
             )
-    links = _links(tree)
-    steps, own = _steps(tree, links)
-    ways = _path_lengths(tree)
+    lengths = _path_lengths(tree)
+    links = _links(tree, lengths)
+    steps, offsets = _steps(tree, links, lengths)
     rows = tuple(
-        _row(tree, j, links[j].antecedent, steps[j], own, way=ways[j]) for j in range(len(tree.joints))
+        _row(tree, j, links[j].antecedent, steps[j], offsets, lengths[j]) for j in range(len(tree.joints))
     )
     poses = [
-        np.linalg.inv(along_axis(*own.get(j, (0.0, 0.0)))) @ links[j].T_link_axis.T for j in range(len(rows))
+        np.linalg.inv(along_axis(*offsets.get(j, (0.0, 0.0)))) @ link.T_link_axis.T
+        for j, link in enumerate(links)
     ]
     T_frame_link = frozen(np.reshape(poses, (-1, 4, 4)))
     left_out = max((link.left_out for link in links), default=0.0)
-    return TreeParameters(tree.name, tree.links[0], rows, frozen(ways), T_frame_link, left_out)
+    return TreeParameters(tree.name, tree.links[0], rows, frozen(lengths), T_frame_link, left_out)
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,9 +199,9 @@ class _LinkAxis:
         antecedent: Index of the nearest moving link towards the root; -1 is the root.
         T_antecedent_axis: (4, 4) pose of this axis frame in the axis frame of the antecedent.
         T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
-        noise: Noise of `T_antecedent_axis`.
-        left_out: Sum (rad) of the tilts between the root and this link that are replaced by zero, because
-            they are not larger than rounding errors.
+        noise: Rounding errors of `T_antecedent_axis`.
+        left_out: Sum (rad) of the tilts between the root and this link that are replaced by zero as rounding
+            errors.
     """
 
     antecedent: int
@@ -222,55 +211,49 @@ class _LinkAxis:
     left_out: float
 
 
-def _links(tree: KinematicTree) -> list[_LinkAxis]:
+def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_LinkAxis]()
-    # Each link has a tuple of three entries.
-    # The first entry is the index of the nearest moving link towards the root, or -1 for the root.
-    # The second entry is the pose of the link in the axis frame of this moving link.
-    # The third entry is the number of joints between the two links.
+    # Each entry contains a link's antecedent, its pose in the antecedent's axis frame, and the number of
+    # joints between the two links.
     carriers = [(-1, np.eye(4), 0)]
-    for j, (joint, way) in enumerate(zip(tree.joints, _path_lengths(tree), strict=True)):
+    for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
         align = turned(joint)
-        here = T @ joint.T_parent_joint @ align
-        noise, tilt = noise_of(folded + 1, 0.0, way), tilt_of(here)
+        T_axis = T @ joint.T_parent_joint @ align
+        noise, tilt = pose_tolerance(folded + 1, 0.0, length), tilt_of(T_axis)
         left_out = links[antecedent].left_out if antecedent >= 0 else 0.0
         left_out += tilt if tilt <= noise.radians else 0.0
-        links.append(_LinkAxis(antecedent, here, align, noise, left_out))
-        carriers.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, here, folded + 1))
+        links.append(_LinkAxis(antecedent, T_axis, align, noise, left_out))
+        carriers.append((j, align.T, 0) if joint.kind.has_axis else (antecedent, T_axis, folded + 1))
     return links
 
 
 def _steps(
-    tree: KinematicTree, links: list[_LinkAxis]
+    tree: KinematicTree, links: list[_LinkAxis], lengths: list[float]
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
-    The transform leads from the axis of the antecedent (the nearest moving link towards the root) to the
-    joint's axis. The angle and the offset lead from the axis frame of a link to the frame of its row. The
-    first moving child of a link defines the link's x axis. For a link without a moving child, x is chosen so
-    that theta = 0.
+    The transform leads from the axis of the antecedent to the joint's axis. The angle and the offset lead
+    from the axis frame of a link to the frame of its row. The first moving child of a link defines the link's
+    x axis. For a link without a moving child, x is chosen so that theta = 0.
     """
-    ways = _path_lengths(tree)
-    steps, own = list[AxisTransform](), {-1: (0.0, 0.0)}
-    for link, joint, way in zip(links, tree.joints, ways, strict=True):
+    steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
+    for link, joint, length in zip(links, tree.joints, lengths, strict=True):
         i = link.antecedent
-        moving = joint.kind.has_axis
-        defines = moving and i not in own
-        before = steps[i].phi_next if i >= 0 else 0.0
-        known = own.get(i, (-before, 0.0))[0]
-        start = -before if defines else known
-        step = step_between(link.T_antecedent_axis, way, NearParallel.HAYATI, start, noise=link.noise)
-        if abs(cleaned_angle(step.phi - start)) > np.pi / 2.0 + RIGHT_ANGLE_SLACK:
-            step = step.turned()
-        if defines:
-            own[i] = (step.phi, step.delta)
+        defines_x = joint.kind.has_axis and i not in offsets
+        phi_next = steps[i].phi_next if i >= 0 else 0.0
+        phi, _ = offsets.get(i, (-phi_next, 0.0))
+        step = step_between(link.T_antecedent_axis, length, phi, hayati=True, noise=link.noise)
+        if abs(cleaned_angle(step.phi - phi)) > np.pi / 2.0 + RIGHT_ANGLE_SLACK:
+            step = step.with_reversed_x()
+        if defines_x:
+            offsets[i] = (step.phi, step.delta)
         steps.append(step)
     for j, joint in enumerate(tree.joints):
-        if joint.kind.has_axis and j not in own:
-            own[j] = (-steps[j].phi_next, 0.0)
-    return steps, own
+        if joint.kind.has_axis and j not in offsets:
+            offsets[j] = (-steps[j].phi_next, 0.0)
+    return steps, offsets
 
 
 def _row(
@@ -278,26 +261,25 @@ def _row(
     j: int,
     i: int,
     step: AxisTransform,
-    own: dict[int, tuple[float, float]],
-    *,
-    way: float,
+    offsets: dict[int, tuple[float, float]],
+    length: float,
 ) -> TreeRow:
     joint = tree.joints[j]
-    turn, shift = own.get(i, (0.0, 0.0))
-    own_turn, own_shift = own.get(j, (0.0, 0.0))
+    phi, delta = offsets.get(i, (0.0, 0.0))
+    own_phi, own_delta = offsets.get(j, (0.0, 0.0))
     rule = joint.mimic
     return TreeRow(
         joint=joint.name,
         link=tree.links[j + 1],
         antecedent=i,
         sigma=_SIGMA[joint.kind],
-        gamma=cleaned_angle(step.phi - turn),
-        b=cleaned_length(step.delta - shift, way),
+        gamma=cleaned_angle(step.phi - phi),
+        b=cleaned_length(step.delta - delta, length),
         alpha=step.alpha + 0.0,
         d=step.a + 0.0,
         beta=step.beta + 0.0,
-        theta=cleaned_angle(step.phi_next + own_turn),
-        r=cleaned_length(step.delta_next + own_shift, way),
+        theta=cleaned_angle(step.phi_next + own_phi),
+        r=cleaned_length(step.delta_next + own_delta, length),
         leader=rule.leader if rule else joint.name,
         multiplier=rule.multiplier if rule else 1.0,
         offset=rule.offset if rule else 0.0,
@@ -306,13 +288,13 @@ def _row(
 
 def _path_lengths(tree: KinematicTree) -> list[float]:
     """Return the path length from the root to each joint's origin: the sum of all offsets (metres)."""
-    ways = [0.0]
+    lengths = [0.0]
     for joint in tree.joints:
-        ways.append(ways[joint.parent] + joint.length)
-    return ways[1:]
+        lengths.append(lengths[joint.parent] + joint.length)
+    return lengths[1:]
 
 
-FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), i = a(j)"
+_FORMULA = "T(i, j) = Rz(gamma) Tz(b) Tx(d) Rx(alpha) Ry(beta) Rz(theta) Tz(r), i = a(j)"
 
 
 def as_mapping(table: TreeParameters) -> dict[str, Any]:
@@ -327,43 +309,34 @@ def as_mapping(table: TreeParameters) -> dict[str, Any]:
 
 
 def document(table: TreeParameters, units: Units) -> TextDocument:
-    rows = [_cells(table, j, units) for j in range(len(table.rows))]
+    angle, length = units.angle_name, units.length_name
+    heads = ["j", "joint", "a(j)", "sigma", f"gamma [{angle}]", f"b [{length}]", f"alpha [{angle}]"]
+    heads += [f"d [{length}]", f"theta [{angle}]", f"r [{length}]", f"beta [{angle}]"]
+    rows = [_cells(row, j, units) for j, row in enumerate(table.rows, 1)]
+    if not any(row.beta for row in table.rows):
+        heads, rows = heads[:-1], [cells[:-1] for cells in rows]
     title = f"{table.robot}: Khalil-Kleinfinger parameters, {table.root} is frame 0"
-    return TextDocument(
-        title, [CodeLine(FORMULA), "", Table(_headings(table, units), rows, (1,), names=(1,))]
-    )
+    return TextDocument(title, [CodeLine(_FORMULA), "", Table(heads, rows, (1,), names=(1,))])
+
+
+def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
+    theta, r = units.angle(row.theta), units.length(row.r)
+    # The constant in a mimic joint's cell includes the offset of the mimic rule.
+    variable = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
+    if row.sigma == 0:
+        theta = added(variable, units.angle(row.theta + row.offset))
+    elif row.sigma == 1:
+        r = added(variable, units.length(row.r + row.offset))
+    cells = [str(j), row.joint, str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
+    cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
+    return [*cells, units.angle(row.beta)]
 
 
 def as_csv(table: TreeParameters) -> str:
     """Return CSV in metres and radians; each line contains a row, and T11 to T34 of T_frame_link."""
-    places = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
-    lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *places]]
-    for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3].tolist(), strict=True):
-        own = [csv_cell(value) if isinstance(value, str) else value for value in row.values()]
-        lines.append([*own, *(x for line in T for x in line)])
+    entries = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
+    lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *entries]]
+    for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3], strict=True):
+        cells = [csv_cell(value) if isinstance(value, str) else value for value in row.values()]
+        lines.append([*cells, *T.ravel().tolist()])
     return csv_text(lines)
-
-
-def _headings(table: TreeParameters, units: Units) -> list[str]:
-    angle, length = units.angle_name, units.length_name
-    heads = ["j", "joint", "a(j)", "sigma", f"gamma [{angle}]", f"b [{length}]", f"alpha [{angle}]"]
-    heads += [f"d [{length}]", f"theta [{angle}]", f"r [{length}]"]
-    return [*heads, f"beta [{angle}]"] if _has_beta(table) else heads
-
-
-def _cells(table: TreeParameters, j: int, units: Units) -> list[str]:
-    row = table.rows[j]
-    theta, r = units.angle(row.theta), units.length(row.r)
-    # The constant in a mimic joint's cell includes the offset of the mimic rule.
-    own = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
-    if row.sigma == 0:
-        theta = added(own, units.angle(row.theta + row.offset))
-    elif row.sigma == 1:
-        r = added(own, units.length(row.r + row.offset))
-    cells = [str(j + 1), row.joint, str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
-    cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
-    return [*cells, units.angle(row.beta)] if _has_beta(table) else cells
-
-
-def _has_beta(table: TreeParameters) -> bool:
-    return any(row.beta for row in table.rows)

@@ -2,10 +2,8 @@ r"""Convert a table's numbers from text and to text, with fractions of pi, degre
 
 A table itself is always in metres and radians. Other units are used only when a table is read or written.
 
-A cell is parsed from text such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`. The
-text of a cell is a sum. Each term of the sum is a number, a multiple of pi, or the joint's variable, which
-may occur only once. A number and a multiple of pi may have a unit. This module rejects invalid cells.
-`urdfkin.dh.rows` supplies a missing unit, and decides which cells may have a variable.
+The text of a cell, such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`, is a sum. Each
+term is a number or a multiple of pi, with or without a unit, or the joint's variable, which may occur once.
 """
 
 from __future__ import annotations
@@ -32,9 +30,12 @@ class Lengths(StrEnum):
     MILLIMETRES = "millimetres"
 
 
-#: Default order of the four columns.
-#: Craig's order is alpha, a, d, theta; that of the Robotics Toolbox is theta, d, a, alpha.
+#: Default order of the four columns, and order of the cells in a row that is a list.
+#: The order in Craig's book is alpha, a, d, theta; in the Robotics Toolbox, theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
+_UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
+#: Maximum number of characters in a cell.
+_LONGEST = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +87,10 @@ class Units:
         return f"{value:.{self.digits}g}" if value else "0"
 
 
-_SHORT = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
-
-
 def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10) -> Units:
     """Return units from their names (also rad, deg, m and mm); raise InputError for an unknown name."""
     try:
-        angles, lengths = (_SHORT.get(name, name) for name in (angles, lengths))
+        angles, lengths = (_UNIT_NAMES.get(name, name) for name in (angles, lengths))
         return Units(Angles(angles), Lengths(lengths), digits)
     except (ValueError, TypeError):
         raise InputError(
@@ -122,7 +120,7 @@ def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
 
 
 def read_number(value: object, where: str) -> float:
-    """Parse a number, a number in text, or a multiple of pi such as "-pi/2"; raise InputError with `where`.
+    """Parse a number, or the text of a number or of a multiple of pi; InputError contains `where`.
 
     >>> read_number("-pi/2", "alpha") == -math.pi / 2
     True
@@ -143,8 +141,8 @@ def _number(value: object) -> float:
         return float(value)
     if not isinstance(value, str):
         raise TypeError(value)
-    cell = cell_of(value)
-    if cell.times is not None or cell.unit not in (None, "rad"):
+    cell = parse_cell(value)
+    if cell.factor is not None or cell.unit not in (None, "rad"):
         raise ValueError(value)
     return cell.number
 
@@ -156,8 +154,8 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     return number if units.angles is Angles.RADIANS else in_radians(number)
 
 
-#: These characters occur in web pages, PDFs and LaTeX; each has an equivalent plain text.
-_SAME = str.maketrans(
+#: Plain text for characters that occur in web pages, PDFs and LaTeX.
+_PLAIN_TEXT = str.maketrans(
     {
         **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),
         **dict.fromkeys("π\U0001d70b\U0001d6d1", " pi "),
@@ -189,11 +187,10 @@ _TOKEN = re.compile(
     r"|(?P<variable>(?:q|theta|th|d)_?\{?[0-9]+\}?\*?|(?:q|theta|var|variable)(?:_?\{?[ij]\}?)?\*?)"
     r"|(?P<name>[A-Za-z]+)|(?P<sign>[-+*/]))"
 )
-_LONGEST = 200
 
 
-class NoCellError(ValueError):
-    """Error for a text that is not a valid cell; the message names the invalid part."""
+class InvalidCellError(ValueError):
+    """Error for a text that is not a valid cell; the message names the invalid token."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,72 +198,78 @@ class Cell:
     """The content of a cell.
 
     Attributes:
-        number: The constant part, in `unit`; in the table's unit if `unit` is None.
+        number: The constant, in `unit`; in the table's unit if `unit` is None.
         unit: "rad" (also for a multiple of pi), "deg", "m" or "mm"; None without a unit.
-        times: Factor of the joint's variable; None if the cell has no variable.
+        factor: Factor of the joint's variable; None if the cell has no variable.
         variable: Number in the variable's name, for example 3 for q3. None if the name has no number.
         text: Text of the constant if it is a single number; "" if it is computed from several numbers.
     """
 
     number: float
     unit: str | None = None
-    times: float | None = None
+    factor: float | None = None
     variable: int | None = None
     text: str = ""
 
+    @property
+    def constant(self) -> str:
+        """Text of the cell without the variable."""
+        return f"{self.number!r} {self.unit or ''}"
 
-def spelled(text: str) -> str:
+
+def plain_text(text: str) -> str:
     r"""Convert a text with symbols or LaTeX to plain letters.
 
-    >>> spelled("−π/2"), spelled(r"$\frac{\pi}{2} + \theta_{1}$").split(), spelled("θ₁*")
+    >>> plain_text("−π/2"), plain_text(r"$\frac{\pi}{2} + \theta_{1}$").split(), plain_text("θ₁*")
     ('- pi /2', ['pi/2', '+', 'theta_{1}'], 'theta1*')
     """
     for pattern, plain in _LATEX:
         text = re.sub(pattern, plain, text)
-    return text.translate(_SAME).strip()
+    return text.translate(_PLAIN_TEXT).strip()
 
 
-def cell_of(written: str) -> Cell:
-    """Parse a cell; raise NoCellError for an invalid cell.
+def parse_cell(original: str) -> Cell:
+    """Parse a cell; raise InvalidCellError for an invalid cell.
 
-    >>> cell_of("-q2 + 90°")
-    Cell(number=90.0, unit='deg', times=-1.0, variable=2, text='90')
+    >>> parse_cell("-q2 + 90°")
+    Cell(number=90.0, unit='deg', factor=-1.0, variable=2, text='90')
     """
-    if len(written) > _LONGEST:
-        raise NoCellError(f"a cell of {len(written)} characters")
-    text = spelled(written)
+    if len(original) > _LONGEST:
+        raise InvalidCellError(f"a cell of {len(original)} characters")
+    text = plain_text(original)
     text = "var" if text == "*" else text
-    terms = _terms(text[1:-1] if text.startswith("(") and text.endswith(")") else text)
-    own = [term for term in terms if term.variable]
+    terms = _parse_terms(text[1:-1] if text.startswith("(") and text.endswith(")") else text)
+    variables = [term for term in terms if term.variable]
     numbers = [term for term in terms if not term.variable]
-    if len(own) > 1:
-        raise NoCellError("two variables in one cell")
-    units = {UNITS[unit] for term in terms for unit in term.units} | {"rad" for one in terms if one.turns}
+    if len(variables) > 1:
+        raise InvalidCellError("two variables in one cell")
+    units = {UNITS[unit] for term in terms for unit in term.units}
+    units |= {"rad" for term in terms if term.has_pi}
     if len(units) > 1:
-        raise NoCellError(f"{' and '.join(sorted(units))} in one cell")
+        raise InvalidCellError(f"{' and '.join(sorted(units))} in one cell")
     number = numbers[0].value if numbers else 0.0
     number = sum((term.value for term in numbers[1:]), number)
     if not math.isfinite(number):
-        raise NoCellError("not a finite number")
-    digits = re.sub(r"[^0-9]", "", own[0].variable) if own else ""
+        raise InvalidCellError("not a finite number")
+    digits = re.sub(r"[^0-9]", "", variables[0].variable) if variables else ""
     return Cell(
         number,
-        min(units, default=None),
-        own[0].value if own else None,
-        int(digits) if digits else None,
-        numbers[0].text if len(numbers) == 1 else "",
+        unit=min(units, default=None),
+        factor=variables[0].value if variables else None,
+        variable=int(digits) if digits else None,
+        text=numbers[0].text if len(numbers) == 1 else "",
     )
 
 
 @dataclass(slots=True)
 class _Term:
-    """A term of a sum in a cell: the text between two signs."""
+    """A term of the sum in a cell; `operator` is * or / if the last token was this operator."""
 
     sign: float = 1.0
     size: float | None = None
     variable: str = ""
     units: tuple[str, ...] = ()
-    turns: bool = False
+    has_pi: bool = False
     text: str = ""
     operator: str = ""
 
@@ -278,48 +281,47 @@ class _Term:
     def is_empty(self) -> bool:
         return self.size is None and not self.variable
 
-    def take(self, token: str, kind: str) -> None:
-        """Add a token to the term; raise NoCellError if the token cannot follow the tokens before it."""
-        divides, joined = self.operator == "/", self.operator == ""
-        if kind == "sign" and not self.is_empty and joined:
+    def append(self, token: str, kind: str) -> None:
+        """Add a token to the term; raise InvalidCellError if it cannot follow the tokens before it."""
+        if kind == "sign" and not self.is_empty and not self.operator:
             self.operator = token
             return
-        if kind == "variable" and not self.variable and not divides:
+        if kind == "variable" and not self.variable and self.operator != "/":
             self.variable = token
-        elif kind == "number" and (self.size is None or not joined):
-            self.text = "" if self.text or self.turns else token
-            self._times(float(token), divides)
+        elif kind == "number" and (self.size is None or self.operator):
+            self.text = "" if self.text or self.has_pi else token
+            self._multiply(float(token))
         elif token == "pi":
-            self.turns, self.text = True, ""
-            self._times(math.pi, divides)
-        elif token in UNITS and not self.is_empty and joined:
+            self.has_pi, self.text = True, ""
+            self._multiply(math.pi)
+        elif token in UNITS and not self.is_empty and not self.operator:
             self.units = (*self.units, token)
         else:
-            raise NoCellError(f"{token!r} is not understood")
+            raise InvalidCellError(f"{token!r} is not understood")
         self.operator = ""
 
-    def _times(self, factor: float, divides: bool) -> None:
+    def _multiply(self, number: float) -> None:
         size = 1.0 if self.size is None else self.size
-        if divides and not factor:
-            raise NoCellError("a division by zero")
-        self.size = size / factor if divides else size * factor
+        if self.operator == "/" and not number:
+            raise InvalidCellError("a division by zero")
+        self.size = size / number if self.operator == "/" else size * number
 
 
-def _terms(text: str) -> list[_Term]:
-    terms, signed, position = [_Term()], False, 0
+def _parse_terms(text: str) -> list[_Term]:
+    terms, after_sign, position = [_Term()], False, 0
     while position < len(text):
         if (found := _TOKEN.match(text, position)) is None:
-            raise NoCellError(f"{text[position:]!r} is not understood")
+            raise InvalidCellError(f"{text[position:]!r} is not understood")
         position, token, kind = found.end(), found[0].strip(), found.lastgroup or ""
         if token in ("+", "-"):
-            if signed or terms[-1].operator:
-                raise NoCellError(f"two signs before {text[position:]!r}")
+            if after_sign or terms[-1].operator:
+                raise InvalidCellError(f"two signs before {text[position:]!r}")
             if not terms[-1].is_empty:
                 terms.append(_Term())
-            signed, terms[-1].sign = True, -1.0 if token == "-" else 1.0
+            after_sign, terms[-1].sign = True, -1.0 if token == "-" else 1.0
         else:
-            terms[-1].take(token, kind)
-            signed = False
-    if signed or terms[-1].operator or terms[-1].is_empty:
-        raise NoCellError("the expression ends too early" if text else "the expression is empty")
+            terms[-1].append(token, kind)
+            after_sign = False
+    if after_sign or terms[-1].operator or terms[-1].is_empty:
+        raise InvalidCellError("the expression ends too early" if text else "the expression is empty")
     return terms

@@ -13,8 +13,7 @@ from typing import Any
 
 from urdfkin.dh.convert import link_names
 from urdfkin.dh.export.text import document
-from urdfkin.dh.export.toolboxes import screws_document
-from urdfkin.dh.screws import ProductOfExponentials
+from urdfkin.dh.screws import ProductOfExponentials, screws_document
 from urdfkin.dh.table import DHTable
 from urdfkin.dh.units import Units
 from urdfkin.errors import UnknownNameError

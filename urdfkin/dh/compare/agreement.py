@@ -1,11 +1,4 @@
-"""Compare a URDF with a published table: compare the cells, and compute the error of the tip's pose.
-
-`max_tip_error_bound` proves a bound of the tip error for every configuration, by the method of `urdfkin
-same`. The path and the table become two mechanisms with the same joints. `urdfkin.model.mechanisms` matches
-the joints of the two mechanisms without a fit. It then computes an upper bound of the tip error that the
-differences cause. The computation begins at the tip and proceeds joint by joint to the base. At each joint it
-uses support functions.
-"""
+"""Compare a URDF with a published table: compare the cells, and compute the error of the tip's pose."""
 
 from __future__ import annotations
 
@@ -15,48 +8,47 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.dh.common_normals import demand_squares_of
+from urdfkin.dh.common_normals import check_lengths_of_table
 from urdfkin.dh.compare.fit import (
     CELLS,
     TableArrays,
     TargetPoses,
-    as_written,
-    columns,
     fit_cells,
     fitted_model,
     hidden_cells,
+    tip_derivatives,
 )
 from urdfkin.dh.compare.mistakes import MistakeSearch
 from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, TableComparison
-from urdfkin.dh.convert import free_tree, link_names, to_convention
+from urdfkin.dh.convert import free_tree, link_names, serial_tree, to_convention
 from urdfkin.dh.snapping import rotation_angle
-from urdfkin.dh.table import DHConvention, DHTable
+from urdfkin.dh.table import DHConvention, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.configuration import values_within
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, is_bounded
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, is_bounded
 
-#: This is the default tolerance for the tip's position (metres).
-#: The tip error is two thirds of this tolerance if one or two cells are rounded to 0.1 mm.
+#: Default tolerance of the tip's position (metres), which covers one or two cells rounded to 0.1 mm.
 TOLERANCE = 2e-4
-#: The fit uses `FIT_SAMPLES` configurations, and its check uses `CHECK_SAMPLES` other configurations.
+#: Numbers of configurations for the fit and for its check.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Differing cells are reported if their correction reduces the tip error to at most this fraction.
-_EXPLAINS = 0.5
-#: At most this fraction of the tip error may remain after the correction of a single mistake.
-_LEFT = 0.05
-#: Smaller changes of a cell, relative to the reach, are not reported (a tenth of `EXPLAINED`).
-_MOVED = 1e-10
-#: A tip that moves by less than this fraction of the path length is treated as fixed.
-#: For such a tip, the reach is the length of the path.
+#: Largest tip error after a correction of the differing cells, relative to the tip error before it.
+_CORRECTED = 0.5
+#: Largest tip error after a correction of a single mistake, relative to the tip error before it.
+_MISTAKE_CORRECTED = 0.05
+#: Smallest reported change of a cell, relative to the reach (a tenth of `EXPLAINED`).
+_LEAST_CHANGE = 1e-10
+#: Maximum number of cells that differ without a fit, in addition to the cells that differ after a fit.
+_MORE_CELLS = 2
+#: Smallest motion of the tip, relative to the path length, that defines the reach.
 _FIXED_TIP = 1e-6
-#: A prismatic joint without limits is sampled in this range (metres).
+#: Range of a prismatic joint without limits (metres).
 _SLIDE = (-0.5, 0.5)
-#: The rounding error (metres or radians) of each cell of each row is half a unit of its last digit.
+#: For each row, the rounding error (metres or radians) of each cell: half a unit of its last digit.
 Digits = Sequence[Mapping[str, float]]
 
 
@@ -84,27 +76,27 @@ def compare(
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
-    tried, judged = _target_poses(chain)
-    written = as_written(standard)
-    fitted = fitted_model(chain, standard, written, tried) if fit else written
-    complete = fit_cells(fitted, tried, _cells_of(reference), free=fit)
-    metres, radians = judged.apart(fitted)
-    written_metres, written_radians = judged.apart(written)
-    residual = judged.apart(complete)[0]
-    cells = _differences(chain, reference, fitted, complete, judged, digits, fit)
+    targets, check_targets = _target_poses(chain)
+    written = TableArrays.of(standard)
+    fitted = fitted_model(chain, standard, targets) if fit else written
+    corrected = fit_cells(fitted, targets, _mask(reference), free=fit)
+    metres, radians = check_targets.largest_errors(fitted)
+    written_metres, written_radians = check_targets.largest_errors(written)
+    residual = check_targets.largest_errors(corrected)[0]
+    cells = _differences(chain, reference, fitted, corrected, check_targets, digits, fit)
     table = _fitted_table(chain, standard, fitted)
-    most_metres, most_radians = max_tip_error_bound(chain, table, _slides(chain))
-    found = TableComparison(
+    most_metres, most_radians = max_tip_error_bound(chain, table)
+    comparison = TableComparison(
         reference=table,
-        reach=tried.scale,
+        reach=targets.scale,
         fitted=fit,
         senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
         offsets=_offsets(standard, fitted),
         base=_absorbed_offset(written.base, fitted.base),
         tool=_absorbed_offset(written.tool, fitted.tool),
-        differences=cells if residual <= max(_EXPLAINS * metres, EXPLAINED * tried.scale) else (),
+        differences=cells if residual <= max(_CORRECTED * metres, EXPLAINED * targets.scale) else (),
         instead=(),
-        hidden=_hidden(reference, fitted, judged) if fit else (),
+        hidden=_hidden(reference, fitted, check_targets) if fit else (),
         mistakes=(),
         residual=residual,
         tolerance=tolerance,
@@ -116,42 +108,41 @@ def compare(
         written_metres=written_metres,
         written_radians=written_radians,
     )
-    if found.as_written:
-        return found
-    enough = tolerance if found.agrees else max(tolerance, _LEFT * found.metres)
-    if mistakes := MistakeSearch(chain, tried, judged, enough).mistakes(
-        reference, fit=fit, agrees=found.agrees
-    ):
-        cells = tuple(one.cell for one in mistakes if one.cell is not None)
-        blamed = cells if len(mistakes) == 1 else ()
-        return replace(found, mistakes=mistakes, differences=blamed)
-    if fit:
-        found = replace(found, instead=_instead(chain, reference, written, found, (tried, judged), digits))
-    return found
+    if comparison.as_written:
+        return comparison
+    enough = tolerance if comparison.agrees else max(tolerance, _MISTAKE_CORRECTED * metres)
+    search = MistakeSearch(chain, targets, check_targets, enough)
+    if mistakes := search.find(reference, fit=fit, agrees=comparison.agrees):
+        cells = tuple(mistake.cell for mistake in mistakes if mistake.cell is not None)
+        return replace(comparison, mistakes=mistakes, differences=cells if len(mistakes) == 1 else ())
+    if not fit:
+        return comparison
+    cells = _differences_without_fit(chain, reference, written, targets, check_targets, digits)
+    few = len(cells) <= len(comparison.differences) + _MORE_CELLS
+    return replace(comparison, instead=cells if few else ())
 
 
-def best_fit(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
-    """Return the largest tip error on samples (metres, radians) after a fast fit of base, tool and offsets.
+def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
+    """Return the largest tip error on samples (metres, radians) after a fast fit of the free parameters.
 
-    To be fast, the fit tries only a few combinations of joint signs and directions of x. If two axes nearly
-    coincide, the fit does not try large opposite changes of their two joint offsets. The fit stops at the tip
-    error `enough` (metres). If the joints differ in number or kind, InputError is raised.
+    The fit tries only a few combinations of joint signs, and stops at the tip error `enough` (metres). If the
+    joints differ in number or kind, InputError is raised.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
-    tried, judged = _target_poses(chain)
-    return judged.apart(fitted_model(chain, standard, as_written(standard), tried, enough, hasty=True))
+    targets, check_targets = _target_poses(chain)
+    return check_targets.largest_errors(fitted_model(chain, standard, targets, enough, fast=True))
 
 
-def _reach(chain: FrameChain, wanted: FloatArray) -> float:
+def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """Return the robot's reach, which converts radians to metres: the spread of the tip's positions.
 
-    A URDF made from a table without Hayati rows may contain an offset of kilometres, and a second offset that
-    compensates it. The path length along the links is then far larger than the reach.
+    The path length is used only if it is shorter, or if the tip hardly moves. In a URDF that was made from a
+    table without Hayati rows, the path length may be kilometres.
     """
-    tips = wanted[:, :3, 3]
-    across = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
-    return max(min(chain.reach, across) if across > _FIXED_TIP * chain.reach else chain.reach, LEAST_SIZE)
+    tips = poses[:, :3, 3]
+    spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
+    return max(min(chain.reach, spread) if spread > _FIXED_TIP * chain.reach else chain.reach, LEAST_SIZE)
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
@@ -161,21 +152,21 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
         InputError: the joints are different.
         RangeError: the square of a length is outside the range of doubles.
     """
-    theirs = [row.kind.turns for row in reference.rows]
-    ours = [joint.kind.turns for joint in chain.joints]
-    if theirs != ours or not ours:
-        words = ["".join("R" if turns else "P" for turns in kinds) or "none" for kinds in (theirs, ours)]
+    in_table, in_urdf = (
+        "".join("R" if item.kind.turns else "P" for item in items) for items in (reference.rows, chain.joints)
+    )
+    if in_table != in_urdf or not in_urdf:
         raise InputError(
             "the table and the path have different joints",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
-            found=f"{words[0]} in the table, {words[1]} in the URDF",
+            found=f"{in_table or 'none'} in the table, {in_urdf or 'none'} in the URDF",
             remedy="choose a base and a tip so that the path has exactly the joints of the table",
         )
-    demand_squares_of(chain, reference)
+    check_lengths_of_table(chain, reference)
 
 
 def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
-    """Return the samples on which a fit is made, and other samples on which the fit is checked."""
+    """Return the samples for a fit, and other samples for its check."""
     values, poses = _samples(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
     return TargetPoses(values, poses, scale), TargetPoses(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
@@ -201,9 +192,8 @@ def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
 def _offsets(standard: DHTable, fitted: TableArrays) -> tuple[float, ...]:
     offsets = []
     for i, row in enumerate(standard.rows):
-        k = fitted.own(i)
-        offset = float(fitted.cells[i, k]) - (row.d if k else row.theta)
-        offsets.append(row.sense * (offset if k else math.remainder(offset, 2.0 * math.pi)))
+        theta, d = fitted.cells[i, :2].tolist()
+        offsets.append(row.sense * (angle_difference(theta, row.theta) if row.kind.turns else d - row.d))
     return tuple(offsets)
 
 
@@ -212,78 +202,79 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
     return AbsorbedOffset(shift, float(rotation_angle(written[:3, :3], fitted[:3, :3])))
 
 
-def _cell_at(reference: DHTable, i: int, cell: str) -> int:
-    """Return the index of the row that contains a cell of the standard row i in the reference table.
+def _reference_row(reference: DHTable, i: int, cell: str) -> int | None:
+    """Return the index of the reference row that contains a cell of the standard row i; None if no row does.
 
-    In a modified table, a, alpha and beta are in row i + 1. If no row contains the cell, the result is the
-    number of rows.
+    In a modified table, a, alpha and beta are in row i + 1.
     """
-    return i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
+    at = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
+    return at if at < len(reference.rows) else None
 
 
-def _cells_of(reference: DHTable) -> FloatArray:
+def _mask(reference: DHTable) -> FloatArray:
     """Return an (n, 5) mask of cells in standard rows: 1 if the reference table contains the cell, else 0."""
-    n = len(reference.rows)
-    return np.array([[float(_cell_at(reference, i, cell) < n) for cell in CELLS] for i in range(n)])
+    rows = range(len(reference.rows))
+    return np.array([[float(_reference_row(reference, i, cell) is not None) for cell in CELLS] for i in rows])
 
 
-def _hidden(reference: DHTable, fitted: TableArrays, judged: TargetPoses) -> tuple[tuple[int, str], ...]:
-    """Return the cells that have the same effect as base, tool or joint offsets; a beta of 0 is left out."""
-    found = [
-        (_cell_at(reference, i, CELLS[k]), CELLS[k])
-        for i, k in hidden_cells(fitted, judged)
-        if k != fitted.own(i) and (CELLS[k] != "beta" or fitted.cells[i, k])
-    ]
-    return tuple(sorted(one for one in found if one[0] < len(reference.rows)))
+def _hidden(
+    reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
+) -> tuple[tuple[int, str], ...]:
+    """Return row and name of the cells that have the same effect as base, tool or joint offsets.
+
+    A beta of 0 is left out.
+    """
+    hidden = []
+    for i, k in hidden_cells(fitted, check_targets):
+        at = _reference_row(reference, i, CELLS[k])
+        if at is not None and k != fitted.variables[i] and (CELLS[k] != "beta" or fitted.cells[i, k]):
+            hidden.append((at, CELLS[k]))
+    return tuple(sorted(hidden))
 
 
 def _differences(
     chain: FrameChain,
     reference: DHTable,
     fitted: TableArrays,
-    complete: TableArrays,
-    judged: TargetPoses,
+    corrected: TableArrays,
+    check_targets: TargetPoses,
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that the fit changed by more than rounding, in descending order of their effect."""
-    twists, scale = columns(fitted, judged)[2], judged.scale
-    linear = np.linalg.norm(twists.reshape(len(judged.values), 6, -1)[:, :3], axis=1).max(axis=0)
-    found = []
+    """Return the cells that differ by more than rounding, in descending order of their effect on the tip."""
+    by_cells, scale = tip_derivatives(fitted, check_targets)[2], check_targets.scale
+    linear = by_cells.reshape(len(check_targets.values), 6, len(fitted.cells), len(CELLS))[:, :3]
+    largest = np.linalg.norm(linear, axis=1).max(axis=0)
+    differences = []
     for i, row in enumerate(fitted.cells):
         for k, cell in enumerate(CELLS):
-            change = float(complete.cells[i, k] - row[k])
-            size = abs(change) * (1.0 if cell in "da" else scale)
-            at = _cell_at(reference, i, cell)
-            if (free and k == fitted.own(i)) or size <= _MOVED * scale or at >= len(reference.rows):
+            change = float(corrected.cells[i, k] - row[k])
+            size = abs(change) * (1.0 if cell in ("a", "d") else scale)
+            at = _reference_row(reference, i, cell)
+            if at is None or (free and k == fitted.variables[i]) or size <= _LEAST_CHANGE * scale:
                 continue
             value = getattr(reference.rows[at], cell)
-            effect = float(linear[5 * i + k] * size)
+            effect = float(largest[i, k] * size)
             last = digits[at].get(cell, 0.0) if at < len(digits) else 0.0
             name = chain.joints[at].name
-            found.append(CellDifference(at, name, cell, value, value + change, effect, last))
-    return tuple(sorted(found, key=lambda one: (-one.tip, one.row, one.cell)))
+            differences.append(CellDifference(at, name, cell, value, value + change, effect, last))
+    return tuple(sorted(differences, key=lambda one: (-one.tip, one.row, one.cell)))
 
 
-def _instead(
+def _differences_without_fit(
     chain: FrameChain,
     reference: DHTable,
     written: TableArrays,
-    found: TableComparison,
-    wanted: tuple[TargetPoses, TargetPoses],
+    targets: TargetPoses,
+    check_targets: TargetPoses,
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that must change if base, tool and offsets are not fitted.
-
-    The result is empty if these changes do not explain the difference between table and URDF.
-    """
-    tried, judged = wanted
-    complete = fit_cells(written, tried, _cells_of(reference), free=False)
-    metres, radians = judged.apart(complete)
-    if metres > EXPLAINED * found.reach or radians > EXPLAINED:
+    """Return the cells that differ if no free parameter is fitted; () if they do not explain the error."""
+    corrected = fit_cells(written, targets, _mask(reference), free=False)
+    metres, radians = check_targets.largest_errors(corrected)
+    if metres > EXPLAINED * targets.scale or radians > EXPLAINED:
         return ()
-    cells = _differences(chain, reference, written, complete, judged, digits, False)
-    return cells if len(cells) <= len(found.differences) + 2 else ()
+    return _differences(chain, reference, written, corrected, check_targets, digits, False)
 
 
 def _fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> DHTable:
@@ -298,31 +289,27 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> 
     return DHTable(DHConvention.STANDARD, tuple(rows), *ends)
 
 
-def max_tip_error_bound(
-    path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]
-) -> tuple[float, float]:
-    """Return an upper bound of a table's tip error (metres, radians); rounding errors are not included.
+def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
+    """Return an upper bound of a table's tip error (metres, radians) for every configuration.
 
-    The mimic rules of the path are ignored. The variables of the table are the path's joint values, and its
-    rows contain the joint signs and joint offsets. `slides` are the ranges of the prismatic joints (metres).
+    The bound does not include rounding errors. Mimic rules are ignored. The path and the table become two
+    mechanisms with the same joints, whose difference is bounded as in `urdfkin same`.
     """
-    mechanisms = Mechanism(_free(path, table, slides)), Mechanism(free_tree(table))
-    found = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
-    variables = variables_of(found, tolerance_of(*mechanisms))
+    mechanisms = Mechanism(_free(path, table)), Mechanism(free_tree(table))
+    pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
+    variables = variables_of(pair, tolerance_of(*mechanisms))
     tip = link_names(table)[-1]
-    frame = next(frame for frame in found.frames if found.a.tree.links[frame.a] == tip)
-    return upper_bounds(found, variables, frame, FINE)
+    frame = next(frame for frame in pair.frames if pair.a.tree.links[frame.a] == tip)
+    return upper_bounds(pair, variables, frame, FINE)
 
 
-def _free(path: FrameChain, table: DHTable, slides: Mapping[str, tuple[float, float]]) -> KinematicTree:
+def _free(path: FrameChain, table: DHTable) -> KinematicTree:
     """Return a path as a tree without mimic rules, with the link names of the table."""
-    names, z = link_names(table), np.array([0.0, 0.0, 1.0])
-    joints = list[tuple[Joint, str, str]]()
-    for i, joint in enumerate(path.joints):
+    slides, z = _slides(path), np.array([0.0, 0.0, 1.0])
+    joints = []
+    for joint in path.joints:
         kind = JointKind.CONTINUOUS if joint.kind.turns else JointKind.PRISMATIC
         limit = Limit(*slides[joint.name], math.inf, math.inf) if joint.name in slides else None
-        one = Joint(joint.name, kind, 0, joint.T_previous_joint, z, limit)
-        joints.append((one, names[i], names[i + 1]))
-    last = free_tree(table).joints[-1]
-    joints.append((replace(last, T_parent_joint=path.T_last_tip), names[-2], names[-1]))
-    return build_tree(path.robot, names[0], joints)
+        joints.append(Joint(joint.name, kind, 0, joint.T_previous_joint, z, limit))
+    joints.append(replace(free_tree(table).joints[-1], T_parent_joint=path.T_last_tip))
+    return serial_tree(path.robot, link_names(table), joints)

@@ -18,14 +18,13 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: If at most this error remains after a change of cells, only these cells differ between table and URDF.
+#: Largest remaining tip error if the differing cells explain the whole error.
 #: The unit is rad for angles, and metres per metre of reach for positions.
 #: The rounding errors of a fit are far smaller, and the last digits in data sheets are far larger.
 EXPLAINED = 1e-9
-#: Fitted numbers are printed with this resolution, or with a coarser resolution.
-#: The unit is rad for angles, and metres per metre of reach for lengths.
+#: Finest resolution of printed fitted numbers (rad, or metres per metre of reach).
 _FINEST = 1e-12
-#: A difference may exceed half a unit of the last digit by the rounding of decimals to doubles.
+#: Largest rounding difference in units of half a last digit; decimals are rounded to doubles.
 _HALF = 1.0 + 1e-6
 
 
@@ -60,6 +59,13 @@ class CellDifference:
     def is_rounding(self) -> bool:
         return abs(self.difference) <= self.last_digit * _HALF
 
+    @property
+    def is_length(self) -> bool:
+        return self.cell in ("a", "d")
+
+    def formatted(self, value: float, units: Units) -> str:
+        return units.length(value) if self.is_length else units.angle(value)
+
 
 @dataclass(frozen=True, slots=True)
 class AbsorbedOffset:
@@ -78,9 +84,11 @@ class MistakeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """Counts of the parameters that a fit must change so that a table agrees with the URDF.
+    """The parameters that a fit must change so that a table agrees with the URDF.
 
-    `zeros` counts zero positions of joints, and `reversed` counts positive directions of joints.
+    Attributes:
+        zeros: Number of changed zero positions of joints.
+        reversed: Number of changed positive directions of joints.
     """
 
     base: bool = False
@@ -127,27 +135,23 @@ class TableComparison:
     Attributes:
         reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
             offsets. The method `placement` of this table takes the URDF's coordinates.
-        reach: Reach of the robot (metres). Rounding errors are relative to the reach, and angles are
-            multiplied by the reach to compare them with lengths.
+        reach: Reach of the robot (metres). An angle times the reach is compared with a length.
         fitted: Whether base, tool, joint signs and joint offsets were fitted.
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
         offsets: Offset of each joint (radians or metres).
         metres, radians: Largest errors of the fitted table's tip on the samples.
         most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all joint
-            values. The bounds do not include rounding errors (`urdfkin.dh.compare.agreement`).
+            values. The bounds do not include rounding errors.
         written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
         differences: The cells that differ, in descending order of their effect at the tip. If there is a
             single mistake, this is the cell of the mistake.
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
-            fitted. The list is empty if changes of cells do not remove the tip error, or if too many cells
-            would have to change.
-        hidden: Row index and name of each cell whose value cannot be determined from the tip's poses. If such
-            a cell has another value, base, tool and joint offsets can compensate for the difference.
-        mistakes: The likely mistakes. A mistake is likely if its correction leaves the smallest number of
-            parameters to fit.
-        residual: Tip error (metres) that remains if the differing cells take the URDF's values. If these
-            cells are the only difference, the remaining error is only rounding.
+            fitted; empty if no few cells remove the tip error.
+        hidden: Row index and name of each cell whose value the tip's poses do not determine, because base,
+            tool and joint offsets compensate for every change.
+        mistakes: The likely mistakes, whose correction leaves the smallest number of parameters to fit.
+        residual: Tip error (metres) that remains if the differing cells take the URDF's values.
         tolerance: Tolerance at the tip (metres).
         samples: Number of configurations at which the fitted table was checked.
     """
@@ -175,11 +179,7 @@ class TableComparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the table agrees with the URDF in all sampled configurations.
-
-        The table agrees if the position error, and the orientation error multiplied by the reach, are within
-        `tolerance`.
-        """
+        """Whether the tip error, with angles times the reach, is within `tolerance` on all samples."""
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
     @property
@@ -190,6 +190,11 @@ class TableComparison:
     def rounding(self) -> float:
         """Limit below which errors are treated as rounding: radians, or metres per metre of reach."""
         return EPS * of_a_fit(len(self.reference.rows))
+
+    @property
+    def resolution(self) -> float:
+        """The power of ten (radians, or metres per metre of reach) to which fitted numbers are rounded."""
+        return resolution(self.metres / self.reach, self.radians)
 
     @property
     def exact(self) -> bool:
@@ -205,8 +210,7 @@ class TableComparison:
 def resolution(share: float, radians: float) -> float:
     """Return the power of ten to which fitted numbers are rounded: at least twice the tip error.
 
-    `share` is the position error of the tip in metres per metre of reach, and `radians` its orientation
-    error.
+    `share` is the position error of the tip in metres per metre of reach; `radians` is the orientation error.
     """
     return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
 
@@ -230,14 +234,14 @@ def document(found: TableComparison, units: Units) -> TextDocument:
 
 def _fitted(found: TableComparison, units: Units) -> Parts:
     parts: Parts = []
-    table, fine = found.reference, resolution(found.metres / found.reach, found.radians)
-    moved = [
-        f"  {row.joint}: {added('-q' if sense < 0 else 'q', shown_offset(offset, row, fine, units))}"
+    table, fine = found.reference, found.resolution
+    variables = [
+        f"  {row.joint}: {added('-q' if sense < 0 else 'q', _format_offset(offset, row, fine, units))}"
         for row, sense, offset in zip(table.rows, found.senses, found.offsets, strict=True)
         if sense < 0 or abs(offset) > fine
     ]
-    if moved:
-        parts += ["", "Joint variables of the table in terms of those of the URDF:", *moved]
+    if variables:
+        parts += ["", "Joint variables of the table (q is the URDF's joint value):", *variables]
     for what, T in (("base", table.base), ("tool", table.tool)):
         rounded = np.round(T / fine) * fine
         if np.abs(rounded - np.eye(4)).max() > fine:
@@ -250,39 +254,39 @@ def _verdict(found: TableComparison) -> list[str]:
     path = f"{table.robot}, {table.base_frame} to {table.tip_frame}"
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
     verdict = agrees if found.agrees else "DIFFERS"
-    off = _off(found.metres, found.radians)
-    proof = f"{found.samples} samples; proven for all values of the joints: {_proven(found)}"
+    error = _tip_error(found.metres, found.radians)
+    proof = f"{found.samples} samples; proven bound for all joint values: {_proven(found)}"
     if found.as_written:
-        return [f"The table {verdict} without a fit: {path}: {off}", f"({proof})."]
+        return [f"The table {verdict} without a fit: {path}: {error}", f"({proof})."]
     if not found.fitted:
         return [
-            f"The table {verdict}: {path}: {off}",
+            f"The table {verdict}: {path}: {error}",
             f"({proof}; base, tool and joint variables are not fitted).",
         ]
-    fine = resolution(found.metres / found.reach, found.radians)
-    ends = [
-        f"{what} by {change.metres * 1e3:.3g} mm and {change.radians:.3g} rad"
-        for what, change in (("the base", found.base), ("the tool", found.tool))
-        if change.metres > found.rounding * found.reach or change.radians > found.rounding
+    fine, ends = found.resolution, (found.base, found.tool)
+    changes = [
+        f"{what} by {_errors(end.metres, end.radians)}"
+        for what, end in zip(("the base", "the tool"), ends, strict=True)
+        if end.metres > found.rounding * found.reach or end.radians > found.rounding
     ]
     zeros = sum(abs(offset) > fine for offset in found.offsets)
-    if zeros:
-        ends.append(f"the zeros of {zeros} joint{'s' if zeros > 1 else ''} (listed below)")
     reversed_ = sum(sense < 0 for sense in found.senses)
+    if zeros:
+        changes.append(f"the zeros of {zeros} joint{'s' * (zeros > 1)} (listed below)")
     if reversed_:
-        ends.append(
-            f"the signs of {reversed_} joints (listed below)"
-            if reversed_ > 1
-            else "the sign of 1 joint (listed below)"
+        s = "s" * (reversed_ > 1)
+        changes.append(f"the sign{s} of {reversed_} joint{s} (listed below)")
+    after_fit = "after a fit of base, tool and joint offsets"
+    once = f" {after_fit}" if found.agrees and changes else ""
+    fitted = "" if found.agrees else f"; {after_fit}"
+    lines = [f"The table {verdict}{once}: {path}: {error}", f"({proof}{fitted})."]
+    lines.append(f"Without a fit, {_tip_error(found.written_metres, found.written_radians)}.")
+    if changes:
+        lines.append(
+            f"The fit changed {', '.join(changes)}. Use --no-fit to compare the table without a fit."
         )
-    once = " after a fit of base, tool and joint offsets" if found.agrees and ends else ""
-    fitted = "" if found.agrees else "; after a fit of base, tool and joint offsets"
-    lines = [f"The table {verdict}{once}: {path}: {off}", f"({proof}{fitted})."]
-    lines.append(f"Without a fit, {_off(found.written_metres, found.written_radians)}.")
-    if ends:
-        lines.append(f"The fit changed {', '.join(ends)}. Use --no-fit to compare the table without a fit.")
-        moved = [max(end.metres / found.reach, end.radians) > fine for end in (found.base, found.tool)]
-        if found.agrees and not found.mistakes and (all(moved) or zeros or reversed_):
+        both_ends = all(max(end.metres / found.reach, end.radians) > fine for end in ends)
+        if found.agrees and not found.mistakes and (both_ends or zeros or reversed_):
             lines.append(
                 "These changes can hide a wrong sign. To find a wrong sign, write base, tool and zeros"
                 " into the table."
@@ -290,26 +294,28 @@ def _verdict(found: TableComparison) -> list[str]:
     return lines
 
 
-def _off(metres: float, radians: float) -> str:
-    return f"the tip is off by up to {metres * 1e3:.3g} mm and {radians:.3g} rad"
+def _errors(metres: float, radians: float) -> str:
+    return f"{metres * 1e3:.3g} mm and {radians:.3g} rad"
+
+
+def _tip_error(metres: float, radians: float) -> str:
+    return f"the tip is off by up to {_errors(metres, radians)}"
 
 
 def _proven(found: TableComparison) -> str:
     if found.exact:
-        return "rounding alone"
-    if math.isinf(found.most_metres):
-        return "nothing"
-    return f"{found.most_metres * 1e3:.3g} mm and {found.most_radians:.3g} rad"
+        return "only rounding errors"
+    return "none" if math.isinf(found.most_metres) else _errors(found.most_metres, found.most_radians)
 
 
 def _mistakes(found: TableComparison, units: Units) -> list[str]:
     first = found.mistakes[0]
-    left = "without a fit" if not first.fitted.count else f"after a fit of only {first.fitted}"
-    count = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
-    lines = ["", f"{count} the table right {left}:"]
-    for one in found.mistakes:
-        off = _off(one.metres, one.radians)
-        lines.append(f"  {_change(one, found.reference, units)}; {off}")
+    remaining_fit = "without a fit" if not first.fitted.count else f"after a fit of only {first.fitted}"
+    subject = "One change makes" if len(found.mistakes) == 1 else "Each of these changes makes"
+    lines = ["", f"{subject} the table right {remaining_fit}:"]
+    for mistake in found.mistakes:
+        error = _tip_error(mistake.metres, mistake.radians)
+        lines.append(f"  {_change(mistake, found.reference, units)}; {error}")
     if found.agrees:
         lines.append(
             "Correct the table. If the fitted base, tool and zeros are intended, write them into the table."
@@ -322,13 +328,12 @@ def _change(mistake: Mistake, table: DHTable, units: Units) -> str:
         if mistake.kind is MistakeKind.REVERSED:
             return "the rows in reverse order"
         return f"rows {' and '.join(str(row + 1) for row in mistake.rows)} exchanged"
-    one = mistake.cell
-    write, unit = (
-        (units.length, units.length_name) if one.cell in ("a", "d") else (units.angle, units.angle_name)
-    )
+    cell = mistake.cell
+    unit = units.length_name if cell.is_length else units.angle_name
     why = "its sign" if mistake.kind is MistakeKind.SIGN else "a right angle"
-    row = f"row {one.row + 1}, {table.rows[one.row].joint}"
-    return f"{row}: {one.cell} = {write(one.urdf)} {unit}, not {write(one.reference)} ({why})"
+    row = f"row {cell.row + 1}, {table.rows[cell.row].joint}"
+    right, wrong = (cell.formatted(value, units) for value in (cell.urdf, cell.reference))
+    return f"{row}: {cell.cell} = {right} {unit}, not {wrong} ({why})"
 
 
 def _cells(found: TableComparison, units: Units) -> Parts:
@@ -338,8 +343,8 @@ def _cells(found: TableComparison, units: Units) -> Parts:
         parts += ["", f"Cells that differ {unit}:", _table(found.differences, units)]
         rounded = sum(one.is_rounding for one in found.differences)
         if rounded:
-            all_ = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
-            parts.append(f"{all_} differ only within the last digit of the table (*).")
+            count = "All" if rounded == len(found.differences) else f"{rounded} of {len(found.differences)}"
+            parts.append(f"{count} differences are within the last digit of the table (*).")
     elif found.as_written:
         parts.append("Every cell agrees with the URDF.")
     elif found.exact:
@@ -351,7 +356,7 @@ def _cells(found: TableComparison, units: Units) -> Parts:
         same = "a change of base, tool or joint offsets has the same effect"
         parts.append(f"These cells are not compared, because {same}: {cells}.")
     if {(one.row, one.cell) for one in found.instead} - {(one.row, one.cell) for one in found.differences}:
-        parts += ["", f"Without fitting, these cells would have to change {unit}:"]
+        parts += ["", f"To agree without a fit, these cells must change {unit}:"]
         parts.append(_table(found.instead, units))
     return parts
 
@@ -359,19 +364,15 @@ def _cells(found: TableComparison, units: Units) -> Parts:
 def _table(cells: Sequence[CellDifference], units: Units) -> Table:
     rows = []
     for one in cells:
-        write = units.length if one.cell in ("a", "d") else units.angle
-        texts = [write(one.reference), write(one.urdf), write(one.difference), f"{one.tip * 1e3:.3g}"]
-        star = "*" if one.is_rounding else ""
-        rows.append((str(one.row + 1), one.joint, one.cell + star, *texts))
+        texts = (one.formatted(value, units) for value in (one.reference, one.urdf, one.difference))
+        name = one.cell + "*" * one.is_rounding
+        rows.append((str(one.row + 1), one.joint, name, *texts, f"{one.tip * 1e3:.3g}"))
     heads = ("row", "joint", "cell", "table", "URDF", "difference", "tip [mm]")
     return Table(heads, rows, left=(1,), names=(1,))
 
 
-def shown_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Format an offset at the resolution `fine`.
-
-    If an angle differs from a multiple of 15 degrees by at most `fine`, it is written as a fraction of pi.
-    """
+def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
+    """Format an offset with the resolution `fine`, or as a multiple of 15 degrees if `fine` allows it."""
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

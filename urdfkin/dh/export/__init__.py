@@ -12,10 +12,10 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: Only these formats have number units.
+#: Module of the formats that have units
 _TEXT = "urdfkin.dh.export.text"
-#: Each format has a summary, and the module of its function `write_NAME`.
-#: The name of the module is "" for a language of `urdfkin export`.
+#: For each format: the module of its function `write_NAME`, and a summary.
+#: The module is "" for a language of `urdfkin export`.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT, "aligned text"),
     "markdown": (_TEXT, "a Markdown table"),
@@ -40,8 +40,8 @@ def export(table: DHTable, format: str, units: Units | None = None, *, verify: b
     """Return the table in a format of `FORMATS`.
 
     `units` is the number format of printed tables; data and code are in metres and radians. Numeric code
-    computes the placement, the Jacobian and the acceleration of the tip. Like the code from `urdfkin export
-    --form dh`, this code contains a self-test. With `verify`, Pinocchio checks the exported code.
+    computes the placement, the Jacobian and the acceleration of the tip, and contains a self-test. With
+    `verify`, Pinocchio checks numeric code.
 
     Raises:
         UnknownNameError: an unknown format.

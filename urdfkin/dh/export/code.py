@@ -1,8 +1,8 @@
 """Export a table as code for exact symbolic computation, and format names and numbers in code.
 
-`urdfkin.export` writes code that computes with doubles. This module writes the rows themselves, so that the
-algebra is exact: pi/2 stays pi/2, and 0.425 becomes 17/40. The languages are Python with SymPy, and MATLAB
-with the Symbolic Math Toolbox, or Octave with the package symbolic.
+`urdfkin.export` writes code that computes with doubles. This module writes the rows themselves, with exact
+numbers: pi/2 stays pi/2, and 0.425 becomes 17/40. The languages are Python with SymPy, and MATLAB with the
+Symbolic Math Toolbox, or Octave with the package symbolic.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 
 from urdfkin.dh.export.text import cells, formula
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
-from urdfkin.dh.units import Units, fraction_text, pi_fraction
+from urdfkin.dh.units import COLUMNS, Units, fraction_text, pi_fraction
 from urdfkin.errors import InputError
 from urdfkin.model.tree import FloatArray, is_bounded
 
@@ -32,13 +32,13 @@ def identifier(name: str) -> str:
 
 
 def docstring(table: DHTable) -> list[str]:
-    """Return the lines of `header` as a Python module's docstring, followed by a blank line."""
+    """Return the lines of `header` as the docstring of a Python module."""
     first, *others = (f"{line}." for line in header(table))
     return ['"""' + first, "", *others, '"""', ""]
 
 
 def header(table: DHTable) -> list[str]:
-    """Return the header's lines without comment marks and without characters that can end a comment."""
+    """Return the lines of the comment at the beginning of a file, without comment marks."""
     lines = [
         f"{table.robot}: {table.base_frame} to {table.tip_frame}",
         f"{table.convention} Denavit-Hartenberg parameters, metres and radians",
@@ -60,7 +60,7 @@ def numbers(values: FloatArray | list[float]) -> str:
     return ", ".join(repr(float(value)) for value in values)
 
 
-def demand_free(table: DHTable, what: str) -> None:
+def check_no_mimic(table: DHTable, what: str) -> None:
     """Raise InputError for a table with mimic joints, which the format `what` does not support."""
     if any(row.mimic is not None for row in table.rows):
         raise InputError(
@@ -71,7 +71,7 @@ def demand_free(table: DHTable, what: str) -> None:
 
 
 def bounds(row: DHRow) -> str:
-    """Return the lower and upper limit separated by a comma; "" if one of them is infinite."""
+    """Return the lower and upper limit, separated by a comma; "" if a limit is infinite."""
     return numbers([row.limit.lower, row.limit.upper]) if is_bounded(row.limit) else ""
 
 
@@ -82,21 +82,19 @@ def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> lis
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
 
 
-#: Integers below this number, and fractions up to this denominator, are exact; other numbers are decimals.
-_LONGEST = 10**9
+#: Largest denominator of an exact fraction, and upper limit of an exact integer.
+#: Other numbers are written as decimals.
+_LARGEST = 10**9
 
 
 class Fractions(Units):
-    """SymPy's exact multiples of pi, and exact fractions (0.425 is 17/40).
-
-    Other angles, and numbers with many digits, are decimals.
-    """
+    """SymPy's exact multiples of pi, and exact fractions (0.425 is 17/40)."""
 
     def length(self, metres: float) -> str:
         sign, x = "-" if metres < 0.0 else "", Fraction(repr(abs(metres)))
-        if x.denominator == 1 and x < _LONGEST:
+        if x.denominator == 1 and x < _LARGEST:
             return f"{sign}{x}"
-        return sign + (self.ratio(x) if x.denominator <= _LONGEST else self.decimal(abs(metres)))
+        return sign + (self.ratio(x) if x.denominator <= _LARGEST else self.decimal(abs(metres)))
 
     def angle(self, radians: float, pi: str = "pi") -> str:
         if (fraction := pi_fraction(radians)) is not None:
@@ -111,7 +109,7 @@ class Fractions(Units):
 
 
 def columns(table: DHTable) -> str:
-    return "a, alpha, d, theta" + (", beta" if table.has_hayati_rows else "")
+    return ", ".join([*COLUMNS, *["beta"] * table.has_hayati_rows])
 
 
 def rows(table: DHTable, number: Fractions, **style: Any) -> list[str]:
@@ -193,22 +191,19 @@ class _Matlab(Fractions):
 
 
 def write_matlab_symbolic(table: DHTable) -> str:
-    """Return a function file `ROBOT_symbolic.m` for MATLAB.
-
-    Use it as `[T, q] = ROBOT_symbolic()`, then `matlabFunction(T, 'Vars', {q})`.
-    """
+    """Return a MATLAB file with the function `[T, q] = ROBOT_symbolic()`."""
     number, n = _Matlab(), len(table.joint_names)
     lines = [f"function [T, q] = {identifier(table.robot)}_symbolic()"]
     lines += [f"% {line}" for line in header(table)]
     names = " ".join(f"q{i}" for i in range(1, n + 1))
     lines += [f"syms {names} real", f"q = [{names.replace(' ', '; ')}];"] if n else ["q = sym(zeros(0, 1));"]
-    found = rows(table, number, pi="sym(pi)", times=" * ")
-    lines += [f"% {columns(table)}", "rows = sym([", *(f"    {row}" for row in found), "]);"]
+    cells_of_rows = rows(table, number, pi="sym(pi)", times=" * ")
+    lines += [f"% {columns(table)}", "rows = sym([", *(f"    {row}" for row in cells_of_rows), "]);"]
     lines.append("one = sym(eye(4));")
     for what, T in (("base", table.base), ("tool", table.tool)):
-        changed = [(i, j) for i in range(4) for j in range(4) if T[i, j] != (i == j)]
-        set_ = (f"{what}({i + 1}, {j + 1}) = {number.length(float(T[i, j]))};" for i, j in changed)
-        lines.append(" ".join([f"{what} = one;", *set_]))
+        entries = [(i, j) for i in range(4) for j in range(4) if T[i, j] != (i == j)]
+        assignments = (f"{what}({i + 1}, {j + 1}) = {number.length(float(T[i, j]))};" for i, j in entries)
+        lines.append(" ".join([f"{what} = one;", *assignments]))
     lines += ["T = base;", "for i = 1:size(rows, 1)"]
     lines += ["    a = rows(i, 1); alpha = rows(i, 2); d = rows(i, 3); theta = rows(i, 4);"]
     lines += [f"    beta = {'rows(i, 5)' if table.has_hayati_rows else '0'};"]

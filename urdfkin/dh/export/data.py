@@ -1,7 +1,7 @@
 """Write a table as plain data, or as JSON, TOML or CSV.
 
-`urdfkin.dh.rows.table_from_mapping` reads the plain data; `urdfkin.dh.read_table` reads the files. The plain
-data and the files keep all numbers unchanged to the last bit. The reference tables in urdfkin are TOML files.
+`urdfkin.dh.rows.table_from_mapping` reads the plain data, and `urdfkin.dh.read_table` reads the files. All
+numbers are exact to the last bit.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import asdict
 from typing import Any
 
 from urdfkin.dh.table import DHRow, DHTable
+from urdfkin.dh.units import COLUMNS
 from urdfkin.errors.escape import csv_cell, escape
 
 
@@ -49,7 +50,7 @@ def to_mapping(table: DHTable) -> dict[str, Any]:
 
 def _row(row: DHRow) -> dict[str, Any]:
     data: dict[str, Any] = {"joint": row.joint, "kind": row.kind.value}
-    data |= {name: getattr(row, name) for name in ("a", "alpha", "d", "theta")}
+    data |= {name: getattr(row, name) for name in COLUMNS}
     if row.beta:
         data["beta"] = row.beta
     if row.sense != 1:
@@ -57,10 +58,8 @@ def _row(row: DHRow) -> dict[str, Any]:
     if row.mimic is not None:
         data["mimic"] = asdict(row.mimic)
     if row.limit is not None:
-        names = ("lower", "upper", "velocity", "effort")
         # JSON cannot store an infinite limit.
-        limits = {name: getattr(row.limit, name) for name in names}
-        data["limit"] = {name: value for name, value in limits.items() if math.isfinite(value)}
+        data["limit"] = {name: value for name, value in asdict(row.limit).items() if math.isfinite(value)}
     return data
 
 
@@ -86,8 +85,8 @@ def _value(value: Any) -> str:
     return "".join(c if c.isprintable() else escape(c) for c in text)
 
 
-COLUMNS = (
-    *("joint", "kind", "sense", "a", "alpha", "d", "theta", "beta"),
+_CSV_COLUMNS = (
+    *("joint", "kind", "sense", *COLUMNS, "beta"),
     *("leader", "multiplier", "offset", "lower", "upper", "velocity", "effort"),
 )
 
@@ -100,10 +99,10 @@ def write_csv(table: DHTable) -> str:
     out = io.StringIO()
     for key, value in data.items():
         out.write(f"# {key}: {json.dumps(value)}\n".replace("##", "#\\u0023"))
-    writer = csv.DictWriter(out, COLUMNS, restval="", lineterminator="\n")
+    writer = csv.DictWriter(out, _CSV_COLUMNS, restval="", lineterminator="\n")
     writer.writeheader()
     for row in rows:
         flat = {**row, **row.pop("mimic", {}), **row.pop("limit", {})}
         named = {key: csv_cell(flat[key]) for key in ("joint", "leader") if key in flat}
-        writer.writerow({key: value for key, value in (flat | named).items() if key in COLUMNS})
+        writer.writerow({key: value for key, value in (flat | named).items() if key in _CSV_COLUMNS})
     return out.getvalue()

@@ -1,7 +1,6 @@
 """Export a table as text: for a terminal, in Markdown, in HTML and in LaTeX.
 
-All formats contain the convention, the formula, base and tool. They use the same functions for headings,
-cells, formulas and poses. The arguments of these functions define how a format writes pi, products and names.
+All formats contain the convention, the formula, the cells, base and tool.
 """
 
 from __future__ import annotations
@@ -11,30 +10,28 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
-from urdfkin.dh.table import DHConvention, DHRow, DHTable
+from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.dh.units import Angles, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
 from urdfkin.model.tree import FloatArray
 
-FORMULA = {
+_FORMULA = {
     DHConvention.STANDARD: "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha)",
     DHConvention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Rz(theta) Tz(d)",
 }
-HAYATI_FORMULA = {
-    DHConvention.STANDARD: "T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)",
-    DHConvention.MODIFIED: "T(i-1, i) = Tx(a(i-1)) Rx(alpha(i-1)) Ry(beta(i-1)) Rz(theta) Tz(d)",
+_LATEX_FORMULA = {
+    DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
+    DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-
-#: A number is multiplied by this factor before it is rounded up to three digits.
-#: Without this factor, a rounding error of 1e-12 could increase the last digit of a short number.
+#: Factor of a bound before it is rounded up to three digits.
+#: A rounding error of 1e-12 in the bound therefore does not increase the last digit.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
 def formula(table: DHTable) -> str:
-    return (HAYATI_FORMULA if table.has_hayati_rows else FORMULA)[table.convention]
+    text = _FORMULA[table.convention]
+    return re.sub(r"Rx\(alpha(\S*)\)", r"\g<0> Ry(beta\1)", text) if table.has_hayati_rows else text
 
 
 def variable(
@@ -52,10 +49,7 @@ def variable(
 
 
 def coordinate_names(table: DHTable) -> str:
-    """Return a text with the joint of each coordinate, such as "with q1 = left, q2 = right".
-
-    The text is empty if the coordinates are the joints of the rows, in row order.
-    """
+    """Return a text such as "with q1 = left, q2 = right"; "" if each row has the coordinate of its joint."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
@@ -75,16 +69,13 @@ def added(variable: str, constant: str) -> str:
 
 
 def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
-    """Return a row's cells a, alpha, d and theta as text with the joint's variable.
-
-    The cell beta is added if some row of the table has a beta that is not 0.
-    """
-    moves = variable(table, row, **style)
+    """Return a row's cells as text with the joint's variable; beta only if the table has Hayati rows."""
+    q = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
     if row.kind.turns:
-        theta = added(moves, units.angle(constant_of(row), pi))
+        theta = added(q, units.angle(constant_of(row), pi))
     else:
-        d = added(moves, units.length(constant_of(row)))
+        d = added(q, units.length(constant_of(row)))
     named = {"a": units.length(row.a), "alpha": units.angle(row.alpha, pi), "d": d, "theta": theta}
     texts = [named[name] for name in units.columns]
     return [*texts, units.angle(row.beta, pi)] if table.has_hayati_rows else texts
@@ -101,10 +92,6 @@ def headings(table: DHTable, units: Units) -> list[str]:
     }
     names = [named[name] for name in units.columns]
     return [*names, f"beta{at} [{angle}]"] if table.has_hayati_rows else names
-
-
-def is_identity(T: FloatArray) -> bool:
-    return bool(np.array_equal(T, np.eye(4)))
 
 
 def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
@@ -141,16 +128,13 @@ def snap_lines(table: DHTable) -> list[str]:
     for change in snap.changes:
         n = len(table.rows)
         row = "base" if change.row < 0 else "tool" if change.row >= n else f"row {change.row + 1}"
-        moved = f"turned by {change.angle:.2e} rad, tip moves by at most {at_most(change.tip)} m"
-        lines.append(f"  {row}: {change.what}, {moved}")
+        effect = f"turned by {change.angle:.2e} rad, tip moves by at most {at_most(change.tip)} m"
+        lines.append(f"  {row}: {change.what}, {effect}")
     return lines
 
 
 def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = False) -> TextDocument:
-    """Return a document with a title, the formula, the rows, base and tool, and the effect of snapping.
-
-    `pi` is the notation of pi. With `wrapped`, long sentences are broken into several lines.
-    """
+    """Return the table as a document; `pi` is the text for pi. With `wrapped`, long sentences are wrapped."""
     rows = [(str(i), row.joint, *cells(table, row, units, pi)) for i, row in enumerate(table.rows, 1)]
     parts: list[str | Table | Matrix] = [CodeLine(formula(table)), ""]
     parts.append(Table(("i", "joint", *headings(table, units)), rows, left=(1,), names=(1,)))
@@ -183,12 +167,6 @@ def write_html(table: DHTable, units: Units) -> str:
     return document(table, units, pi="\u03c0").html() + "\n"
 
 
-_FORMULA = {
-    DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
-    DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
-}
-
-
 def write_latex(table: DHTable, units: Units) -> str:
     """Return a LaTeX table environment; it needs the packages amsmath, booktabs and graphicx."""
     modified = table.convention is DHConvention.MODIFIED
@@ -206,49 +184,49 @@ def write_latex(table: DHTable, units: Units) -> str:
         heads.append(rf"$\beta{at}$ [{angle}]")
     rows = []
     for i, row in enumerate(table.rows, 1):
-        texts = [maths(text) for text in cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")]
-        rows.append([str(i), latex_text(row.joint), *texts])
+        texts = cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")
+        rows.append([str(i), latex_text(row.joint), *map(latex_math, texts)])
     poses = {what: T for what, T in (("Base", table.base), ("Tool", table.tool)) if not is_identity(T)}
     frame = [rf"\begin{{tabular}}{{rl{'r' * (len(heads) - 2)}}}", r"  \toprule"]
     frame += [f"  {' & '.join(heads)} \\\\", r"  \midrule", *(f"  {' & '.join(row)} \\\\" for row in rows)]
     frame += [r"  \bottomrule", r"\end{tabular}"]
-    lines = [r"\begin{table}", r"  \centering", f"  \\caption{{{_caption(table)}}}", *fitted(frame)]
-    lines += [line for what, T in poses.items() for line in pose(what, T)]
+    lines = [r"\begin{table}", r"  \centering", f"  \\caption{{{_caption(table)}}}", *scaled_to_fit(frame)]
+    lines += [line for what, T in poses.items() for line in latex_pose(what, T)]
     return "\n".join([*lines, r"\end{table}"]) + "\n"
 
 
 def _caption(table: DHTable) -> str:
     names = f"{latex_text(table.robot)}, {latex_text(table.base_frame)} to {latex_text(table.tip_frame)}"
-    product = _FORMULA[table.convention]
+    product = _LATEX_FORMULA[table.convention]
     if table.has_hayati_rows:
-        product = product.replace(r"R_x(\alpha_i)", r"R_x(\alpha_i)\,R_y(\beta_i)")
-        product = product.replace(r"R_x(\alpha_{i-1})", r"R_x(\alpha_{i-1})\,R_y(\beta_{i-1})")
+        product = re.sub(r"R_x\(\\alpha(\S*?)\)", r"\g<0>\\,R_y(\\beta\1)", product)
     caption = f"Denavit--Hartenberg parameters of {names}, {table.convention} convention, $T = {product}$."
     if table.snap is not None and table.snap.changes:
         caption += (
-            f" Angles were rounded within {maths(f'{table.snap.tolerance:.2g}')}\\,rad,"
-            f" which moves the tip by at most {maths(at_most(table.snap.metres))}\\,m."
+            f" Angles were rounded within {latex_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
+            f" which moves the tip by at most {latex_math(at_most(table.snap.metres))}\\,m."
         )
     return caption
 
 
-def fitted(lines: list[str]) -> list[str]:
+def scaled_to_fit(lines: list[str]) -> list[str]:
     """Return LaTeX code that scales a table down to the width of the text if the table is wider."""
     size = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
     return [rf"  \resizebox{{{size}}}{{!}}{{%", *(f"    {line}" for line in lines), "  }"]
 
 
-def pose(what: str, T: FloatArray) -> list[str]:
+def latex_pose(what: str, T: FloatArray) -> list[str]:
     """Return LaTeX lines with a pose, in metres."""
-    rows = (" & ".join(_plain(f"{x + 0.0:.6g}") for x in row) for row in T)
+    rows = (" & ".join(_with_powers_of_ten(f"{x + 0.0:.6g}") for x in row) for row in T)
     matrix = r"\begin{bmatrix}" + r" \\ ".join(rows) + r"\end{bmatrix}"
-    return [r"  \par\medskip", *fitted([rf"{what} (m): ${matrix}$"])]
+    return [r"  \par\medskip", *scaled_to_fit([rf"{what} (m): ${matrix}$"])]
 
 
-def maths(text: str) -> str:
-    """Write a cell in LaTeX's math mode; 1e-6 becomes a power of ten, and a fraction a/b is not changed."""
-    return f"${_plain(text)}$"
+def latex_math(text: str) -> str:
+    """Write a cell in LaTeX's math mode."""
+    return f"${_with_powers_of_ten(text)}$"
 
 
-def _plain(text: str) -> str:
+def _with_powers_of_ten(text: str) -> str:
+    """Replace 1e-6 with a power of ten."""
     return re.sub(r"e([+-])0*(\d+)", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)

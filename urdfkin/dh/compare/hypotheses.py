@@ -1,0 +1,280 @@
+"""Find another convention, other units or other column names with which a table agrees with a URDF.
+
+An interpretation of a table consists of a convention, units and column names. In each interpretation, the
+table describes a robot with a different shape: the distances and angles of consecutive axes, and the offsets
+along them. `diagnose` fits only the few interpretations whose shapes are closest to the URDF's shape.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import pairwise, permutations, product
+from typing import Any
+
+import numpy as np
+
+from urdfkin.dh.compare.agreement import compare, fast_fit_errors
+from urdfkin.dh.compare.result import TableComparison
+from urdfkin.dh.convert import to_convention
+from urdfkin.dh.derive import Choices, derive
+from urdfkin.dh.rows import by_column, table_from_mapping
+from urdfkin.dh.table import DHConvention, DHTable, convention_of, looks_round
+from urdfkin.dh.units import COLUMNS, Angles, Lengths, units_of
+from urdfkin.errors import InputError, QuestionsSection, RangeError
+from urdfkin.model.chain import FrameChain
+from urdfkin.model.tree import FloatArray
+
+#: Maximum number of interpretations that are fitted.
+_MOST_FITS = 3
+#: Tilt (rad) below which two axes are treated as parallel.
+_PARALLEL = 2e-2
+#: Cost of each difference from the file, relative to the smallest difference of the shapes.
+_DIFFERENCE_COST = 0.1
+#: Largest tip error of a better interpretation, relative to the original tip error and to the reach.
+_BETTER = 0.05
+#: Keys of a row that `diagnose` uses; it ignores limits and mimic rules.
+_CELLS = ("joint", "kind", "sense", "beta", *COLUMNS)
+#: Keys of a table that `diagnose` ignores, because base and tool are fitted.
+_ENDS = ("base", "tool", "coordinates")
+#: Plausible lengths of an arm (metres)
+_LONGEST, _SHORTEST = 20.0, 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class BetterInterpretation:
+    """Another interpretation of a table, with which the table agrees with the URDF.
+
+    Attributes:
+        stated: The interpretation that the table's file states.
+        metres, radians: Largest errors of the tip on the samples, after a fit of base, tool and offsets.
+    """
+
+    interpretation: Interpretation
+    stated: Interpretation
+    metres: float
+    radians: float
+
+    def __str__(self) -> str:
+        return (
+            f"the table agrees with the URDF to {self.metres * 1e3:.3g} mm and {self.radians:.3g} rad"
+            f" when it is read as {self.interpretation.differences(self.stated)}"
+        )
+
+    def as_mapping(self) -> dict[str, Any]:
+        return {
+            "convention": str(self.interpretation.convention),
+            "lengths": str(self.interpretation.lengths),
+            "angles": str(self.interpretation.angles),
+            "columns": list(self.interpretation.columns),
+            "tip_off_at_most_m": self.metres,
+            "tip_turned_at_most_rad": self.radians,
+        }
+
+
+def diagnose(
+    chain: FrameChain, data: Mapping[str, Any], tolerance: float, stated_error: float = math.inf
+) -> BetterInterpretation | None:
+    """Return the interpretation with which a table agrees with a URDF; None if there is none.
+
+    `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` is the
+    tip error of the table as its file states it, and `tolerance` is the tolerance at the tip (metres). With
+    the returned interpretation, the tip error is at most 5 % of `stated_error`, or within `tolerance`.
+    """
+    kinds = [joint.kind.turns for joint in chain.joints]
+    shape_of_urdf = shape(derive(chain, Choices(last="flange")), chain.reach)
+    try:
+        stated = stated_interpretation(data)
+    except InputError:  # Another function reports this error.
+        return None
+    candidates = list[tuple[float, int, Interpretation, DHTable]]()
+    for interpretation, table in other_interpretations(data):
+        if [row.kind.turns for row in table.rows] != kinds or not kinds:
+            return None
+        difference = float(np.abs(shape(table, chain.reach) - shape_of_urdf).sum())
+        candidates.append((difference, interpretation.difference_count(stated), interpretation, table))
+    if not candidates:
+        return None
+    cost = _DIFFERENCE_COST * min(difference for difference, *_ in candidates) + tolerance
+    candidates.sort(key=lambda candidate: candidate[0] + cost * candidate[1])
+    better = list[tuple[float, BetterInterpretation]]()
+    for _, count, interpretation, table in candidates[:_MOST_FITS]:
+        try:
+            metres, radians = fast_fit_errors(chain, table, tolerance)
+        except RangeError:  # A length is too large in this interpretation.
+            continue
+        error = metres + radians * chain.reach
+        if error <= max(tolerance, min(_BETTER * stated_error, _BETTER * chain.reach)):
+            result = BetterInterpretation(interpretation, stated, metres, radians)
+            better.append((error + tolerance * count, result))
+            if error <= tolerance:
+                break
+    return min(better, key=lambda rated: rated[0])[1] if better else None
+
+
+def convention_that_fits(
+    chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
+) -> DHConvention:
+    """Find the convention of a table whose file names no convention, by a comparison with a path.
+
+    `tolerance` is the tolerance at the tip (metres).
+
+    Raises:
+        InputError: both conventions fit equally well, or neither convention fits, even in other units.
+    """
+    comparisons = dict[DHConvention, TableComparison]()
+    errors = list[InputError]()
+    for convention in DHConvention:
+        try:
+            table = table_from_mapping({**data, "convention": convention})
+            comparisons[convention] = compare(chain, table, tolerance)
+        except InputError as error:
+            errors.append(error)
+    tests: tuple[Callable[[TableComparison], object], ...] = (
+        lambda comparison: comparison.agrees and comparison.written_metres <= tolerance,
+        lambda comparison: comparison.passes,
+        lambda comparison: comparison.agrees,
+        lambda comparison: comparison.mistakes,
+    )
+    by_test = ([name for name, comparison in comparisons.items() if test(comparison)] for test in tests)
+    best = next(filter(None, by_test), [])
+    if len(best) == 1:
+        return best[0]
+    if not best and (better := diagnose(chain, data, tolerance)) and better.interpretation.convention:
+        return better.interpretation.convention
+    if errors and not comparisons:
+        raise errors[0]
+    tip_errors = (f"{comparison.metres * 1e3:.3g} mm as {name}" for name, comparison in comparisons.items())
+    raise InputError(
+        f"the table does not name its convention, and {'both conventions fit' if best else 'neither fits'}",
+        where=where,
+        found=f"tip errors {' and '.join(tip_errors)}",
+        remedy="write convention = 'standard' or 'modified' (in text: a line `convention: standard`)",
+        question=QuestionsSection.WHICH_DH_CONVENTION,
+    )
+
+
+def shape(table: DHTable, scale: float) -> FloatArray:
+    """Return distance and angle (times `scale`) of each pair of consecutive axes, and the offset before it.
+
+    These numbers do not depend on joint signs, joint offsets, base or tool. Offsets along parallel axes are
+    summed. A number is 0 if a choice can change it: the distance from a prismatic axis, the offsets next to
+    such an axis, and the offset along the first axis.
+    """
+    rows = to_convention(table, DHConvention.STANDARD).rows
+    numbers, offset, is_defined = list[float](), 0.0, False
+    for row, following in pairwise(rows):
+        both_turn = row.kind.turns and following.kind.turns
+        tilt = math.atan2(math.hypot(math.sin(row.alpha), math.sin(row.beta)), abs(math.cos(row.alpha)))
+        parallel = tilt < _PARALLEL
+        offset, is_defined = offset + row.d, is_defined and both_turn
+        numbers += [
+            abs(offset) if is_defined and not parallel else 0.0,
+            abs(row.a) if both_turn else 0.0,
+            scale * tilt,
+        ]
+        offset = math.copysign(1.0, math.cos(row.alpha)) * offset if parallel else 0.0
+        is_defined = is_defined if parallel else both_turn
+    return np.array(numbers)
+
+
+@dataclass(frozen=True, slots=True)
+class Interpretation:
+    """Convention, units and columns of a table.
+
+    Attributes:
+        convention: Standard or modified; None if the table names no convention.
+        columns: Contents of the columns that the table calls a, alpha, d and theta, or of its four columns.
+    """
+
+    convention: DHConvention | None
+    lengths: Lengths
+    angles: Angles
+    columns: tuple[str, ...] = COLUMNS
+
+    def table(self, data: Mapping[str, Any]) -> DHTable:
+        """Return the table in this interpretation, without base and tool; raise InputError if invalid."""
+        stated = {"convention": self.convention, "lengths": self.lengths, "angles": self.angles}
+        contents = dict(zip(COLUMNS, self.columns, strict=True))
+        rows = [{contents.get(key, key): value for key, value in row.items()} for row in data["rows"]]
+        rest = {key: value for key, value in data.items() if key not in _ENDS}
+        return table_from_mapping({**rest, **stated, "rows": rows})
+
+    def difference_count(self, other: Interpretation) -> int:
+        """Return the number of differences; two exchanged columns are counted as one difference."""
+        columns = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
+        return len(self._convention_and_units(other)) + (columns + 1) // 2
+
+    def differences(self, other: Interpretation) -> str:
+        """Name the differences from another interpretation, for example "modified, millimetres"."""
+        names = self._convention_and_units(other)
+        if self.columns != other.columns:
+            names.append(f"its columns {', '.join(COLUMNS)} as {', '.join(self.columns)}")
+        return ", ".join(names)
+
+    def _convention_and_units(self, other: Interpretation) -> list[str]:
+        """Return the names of convention and units that differ from another interpretation."""
+        mine, theirs = ((one.convention, one.lengths, one.angles) for one in (self, other))
+        return [str(name) for name, other_name in zip(mine, theirs, strict=True) if name is not other_name]
+
+
+def stated_interpretation(data: Mapping[str, Any]) -> Interpretation:
+    """Return the interpretation that a file states; raise InputError for an unknown convention or unit."""
+    units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
+    convention = convention_of(data["convention"]) if "convention" in data else None
+    return Interpretation(convention, units.lengths, units.angles)
+
+
+def other_interpretations(data: Mapping[str, Any]) -> Iterator[tuple[Interpretation, DHTable]]:
+    """Yield every other interpretation in which the table is valid, the most similar first."""
+    rows = data.get("rows")
+    if not isinstance(rows, list) or not all(isinstance(row, (list, Mapping)) for row in rows):
+        return
+    named = (row if isinstance(row, Mapping) else by_column(row) for row in rows)
+    stated = stated_interpretation(data)
+    data = {**data, "rows": [{key: row[key] for key in row if key in _CELLS} for row in named]}
+    choices = product(DHConvention, Lengths, Angles, permutations(COLUMNS))
+    interpretations = [Interpretation(*choice) for choice in choices]
+    for interpretation in sorted(interpretations, key=lambda one: one.difference_count(stated)):
+        if interpretation != stated:
+            with suppress(InputError):
+                yield interpretation, interpretation.table(data)
+
+
+def table_warnings(table: DHTable) -> list[str]:
+    """Return warnings about units or columns that look wrong, each with a remedy.
+
+    Most angles of an arm are multiples of 30 degrees, and lengths hardly ever look like such angles.
+
+    >>> from urdfkin.dh.rows import table_from_rows
+    >>> table_warnings(table_from_rows([[425, 0, 0, 0], [392.25, 0, 0, 0]], "standard"))
+    ["lengths up to 425 m look like millimetres: if they are millimetres, write lengths = 'millimetres'"]
+    """
+    warnings = []
+    columns = {name: [getattr(row, name) for row in table.rows if getattr(row, name)] for name in COLUMNS}
+    lengths = [abs(length) for length in (*columns["a"], *columns["d"])]
+    if lengths and max(lengths) > _LONGEST and all(length > _SHORTEST * 1e3 for length in lengths):
+        warnings.append(
+            f"lengths up to {max(lengths):.4g} m look like millimetres:"
+            " if they are millimetres, write lengths = 'millimetres'"
+        )
+    elif lengths and max(lengths) < _SHORTEST * 2.0:
+        warnings.append(
+            f"lengths of {max(lengths) * 1e3:.3g} mm at most look like metres:"
+            " if they are metres, write lengths = 'metres'"
+        )
+    angles = [*columns["alpha"], *columns["theta"]]
+    if angles and all(looks_round(math.degrees(angle)) for angle in angles):
+        warnings.append(
+            "angles of 1.57 degrees look like radians: if they are radians, write angles = 'radians'"
+        )
+    for length, angle in (("a", "alpha"), ("d", "theta")):
+        lengths_look_round = len(columns[length]) > 1 and all(map(looks_round, columns[length]))
+        if lengths_look_round and columns[angle] and not any(map(looks_round, columns[angle])):
+            warnings.append(
+                f"the columns {length} and {angle} look exchanged: column {length} contains multiples of"
+                " common angles"
+            )
+    return warnings

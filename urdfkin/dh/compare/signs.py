@@ -1,0 +1,227 @@
+"""Find the joint signs and the directions of x with which a reference table fits a path of a URDF.
+
+The author of a table makes three choices that do not change the robot: the positive direction of each joint,
+the direction of x along each common normal, and the zero position of each theta. A sign +1 or -1 represents a
+direction, and the zero positions follow from the signs. Each combination of signs gives a table of the path.
+A beam search extends the combinations joint by joint, and keeps the combinations whose tables differ least
+from the reference table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urdfkin.dh.common_normals import (
+    LARGEST_HAYATI_TILT,
+    NEARLY_PARALLEL,
+    AxisTransform,
+    shifted_along_z,
+    step_between,
+    tilt_of,
+)
+from urdfkin.dh.table import DHRow, DHTable, along_axis, angle_difference
+from urdfkin.model.chain import LEAST_SIZE, FrameChain
+from urdfkin.model.tree import FloatArray
+
+#: Maximum number of alignments that `align` returns.
+PATTERNS = 12
+#: Maximum number of partial alignments that the search keeps at each joint.
+BEAM = 128
+#: Cost (metres) of each reversed joint.
+#: Among equally good alignments, the search therefore selects the joint signs of the URDF.
+_REVERSAL_COST = 1e-9
+#: Weight of differences between lengths next to a prismatic axis, because this axis can be shifted.
+_SLIDING_WEIGHT = 1e-3
+#: Distance (metres) below which two axes are treated as coinciding, so that x can have any direction.
+_NO_OFFSET = 1e-5
+#: Number of decimals (metres, radians) to which the numbers of equivalent alignments agree.
+_DECIMALS = 6
+
+_HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class SignFit:
+    """A combination of joint signs, with the joint offsets, the base and the tool that belong to these signs.
+
+    Attributes:
+        senses: +1 or -1 for each joint. With -1, the reference's variable decreases if the URDF's joint value
+            increases.
+        offsets: Number that is added to theta of each row in the reference (to d for a prismatic joint).
+        base: (4, 4) pose of the reference's frame 0 in the URDF's base.
+        tool: (4, 4) pose of the URDF's tip in the reference's last frame.
+    """
+
+    senses: tuple[int, ...]
+    offsets: tuple[float, ...]
+    base: FloatArray
+    tool: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class _PartialAlignment:
+    """An alignment of the first joints of the chain, which the search extends joint by joint.
+
+    Attributes:
+        cost: Sum of the differences between the cells of the two tables, in metres. Differences of angles are
+            multiplied by the reach.
+        senses: Sign (+1 or -1) of each of these joints.
+        offsets: Offsets of these joints except the last joint.
+        phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
+        carry: Offset along z from the last joint's DH frame to its URDF frame (metres).
+        base: (4, 4) transform that becomes part of the base, instead of an offset in the first row.
+        free_offset: Row index and sign of a joint offset that can be chosen, because axes before the last
+            joint coincide and only the sum of their joint angles is defined. The sign is the direction in
+            which this offset rotates x. The index 0 is the base. None if no joint offset can be chosen.
+    """
+
+    cost: float
+    senses: tuple[int, ...]
+    offsets: tuple[float, ...]
+    phi_in: float
+    carry: float
+    base: FloatArray
+    free_offset: tuple[int, float] | None = None
+
+
+def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[SignFit]:
+    """Return up to `count` alignments of a path with a reference table, the closest first.
+
+    The reference table must be standard and have the same kinds of joints. With prismatic joints, several
+    combinations of signs may give equal tables, and only a fit can distinguish them.
+    """
+    reach = max(chain.reach, reference.span, LEAST_SIZE)
+    costs = {1: 0.0, -1: _REVERSAL_COST}
+    partials = [_PartialAlignment(costs[sense], (sense,), (), 0.0, 0.0, np.eye(4)) for sense in costs]
+    for i in range(len(reference.rows) - 1):
+        longer = [
+            extended
+            for partial in partials
+            for sense in costs
+            for extended in _extend(partial, chain, reference, i, sense, reach)
+        ]
+        partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
+    # If axes nearly coincide, many directions of x are nearly equivalent.
+    # A fit that starts from one of these directions can reach all of them.
+    # Therefore, only the best alignment is kept for each combination of joint signs.
+    by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
+    for partial in partials:
+        by_senses.setdefault(partial.senses, partial)
+    return [_with_tool(partial, chain, reference) for partial in list(by_senses.values())[:count]]
+
+
+def _without_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlignment]:
+    """Keep the first of several alignments that differ only by a rotation about coinciding axes."""
+    different: dict[tuple[object, ...], _PartialAlignment] = {}
+    for partial in partials:
+        # A free joint offset can reverse x, so the two directions of x are then equivalent.
+        period = math.pi if partial.free_offset else 2.0 * math.pi
+        last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.carry, _DECIMALS)
+        different.setdefault((partial.senses, partial.free_offset, *last_frame), partial)
+    return list(different.values())
+
+
+def _constant(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
+    """Return the constant pose A_k; reverse the z axis of each neighbouring joint with sign -1."""
+    A = chain.constants[k]
+    A = _HALF_TURN @ A if sense_before < 0 else A
+    return np.array(A @ _HALF_TURN if sense_after < 0 else A)
+
+
+def _extend(
+    partial: _PartialAlignment, chain: FrameChain, reference: DHTable, i: int, sense: int, reach: float
+) -> list[_PartialAlignment]:
+    """Extend an alignment from joint i to joint i + 1; try both directions of x."""
+    row, turns = reference.rows[i], [one.kind.turns for one in reference.rows]
+    both_turn = turns[i] and turns[i + 1]
+    A = _constant(chain, i + 1, partial.senses[-1], sense)
+    delta = row.d - partial.carry if turns[i] and i > 0 else 0.0
+    extended = []
+    for step in _steps(A, row, delta, reach, row.theta - partial.phi_in, both_turn):
+        candidate = _with_theta(partial, step, row.theta) if i > 0 and not turns[i] else partial
+        theta, d = candidate.phi_in + step.phi, candidate.carry + step.delta
+        theta_error = angle_difference(theta, row.theta)
+        cost = candidate.cost + _REVERSAL_COST * (sense < 0)
+        cost += reach * (abs(angle_difference(step.alpha, row.alpha)) + abs(step.beta - row.beta))
+        cost += abs(step.a - row.a) * (1.0 if both_turn else _SLIDING_WEIGHT)
+        if i > 0 and turns[i]:
+            cost += abs(d - row.d) * (1.0 if turns[i - 1] and turns[i + 1] else _SLIDING_WEIGHT)
+        elif i > 0:
+            cost += reach * abs(theta_error)
+        offset, base = theta_error if turns[i] else d - row.d, candidate.base
+        if i == 0:  # The base contains the first row's offset.
+            base, offset = along_axis(step.phi - row.theta, step.delta - row.d), 0.0
+        senses, offsets = (*candidate.senses, sense), (*candidate.offsets, offset)
+        free_offset = _free_offset(candidate, step, i, turns[i])
+        extended.append(
+            _PartialAlignment(cost, senses, offsets, step.phi_next, step.delta_next, base, free_offset)
+        )
+    return extended
+
+
+def _free_offset(
+    partial: _PartialAlignment, step: AxisTransform, i: int, turns: bool
+) -> tuple[int, float] | None:
+    if not step.phi_is_free:
+        return None
+    sign = math.copysign(1.0, math.cos(step.alpha))
+    if turns or i == 0:
+        return i, sign
+    return None if partial.free_offset is None else (partial.free_offset[0], sign * partial.free_offset[1])
+
+
+def _with_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
+    """Change the free joint offset so that the next row, of a prismatic joint, has the given theta."""
+    if partial.free_offset is None:
+        return partial
+    excess = partial.phi_in + step.phi - theta
+    index, sign = partial.free_offset
+    offsets, base = list(partial.offsets), partial.base
+    if index == 0:
+        base = base @ along_axis(sign * excess, 0.0)
+    else:
+        offsets[index] += sign * excess
+    return replace(partial, phi_in=partial.phi_in - excess, offsets=tuple(offsets), base=base)
+
+
+def _steps(
+    A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, both_turn: bool
+) -> Iterator[AxisTransform]:
+    """Yield the possible transforms between two axes, with both directions of x.
+
+    If the axes are nearly parallel in the URDF and in the reference, the transform of a Hayati row is
+    possible; its x axis is at the offset d of the reference. The transform along the common normal is
+    possible unless the reference has a Hayati row. A shift of a prismatic axis can give x any direction.
+    """
+    steps = []
+    sine = tilt_of(A)
+    near = abs(math.sin(row.alpha)) < LARGEST_HAYATI_TILT and sine < LARGEST_HAYATI_TILT
+    if not near or row.beta == 0.0:
+        steps.append(step_between(A, reach, phi_free, hayati=False))
+    if near:
+        shifted = shifted_along_z(A, -delta)
+        if math.hypot(shifted[0, 3], shifted[1, 3]) < _NO_OFFSET or not both_turn:
+            shifted[:2, 3] = 0.0
+        # With reach 0, `step_between` makes a Hayati row for all axes that are not exactly parallel.
+        hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
+        step = step_between(shifted, hayati_reach, phi_free, hayati=True)
+        steps.append(replace(step, delta=step.delta + delta))
+    for step in steps:
+        yield step
+        yield replace(step.with_reversed_x(), phi_is_free=step.phi_is_free)
+
+
+def _with_tool(partial: _PartialAlignment, chain: FrameChain, reference: DHTable) -> SignFit:
+    n, last = len(reference.rows), reference.rows[-1]
+    base = _constant(chain, 0, 1, partial.senses[0]) @ partial.base
+    tip = _constant(chain, n, partial.senses[-1], 1)
+    if n == 1:
+        base = base @ along_axis(-last.theta, -last.d)
+    else:
+        tip = along_axis(partial.phi_in - last.theta, partial.carry - last.d) @ tip
+    tool = np.asarray(np.linalg.solve(last.X, tip), np.float64)
+    return SignFit(partial.senses, (*partial.offsets, 0.0), base, tool)
