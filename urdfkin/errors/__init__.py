@@ -55,9 +55,9 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
 class QuestionsSection(Enum):
     """A section of docs/questions.md, by the anchor of its heading.
 
-    If you print a question, you see the command that prints its section:
+    The text of a member is the command that prints the section:
 
-    >>> print(Question.MIMIC_JOINTS)
+    >>> print(QuestionsSection.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`
     """
 

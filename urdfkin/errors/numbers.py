@@ -93,8 +93,8 @@ def parse_quantity(text: str) -> ParsedNumber | None:
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
     (True, True)
     >>> [parse_quantity(text) for text in ("5 mm", "2 rad/s^2", "0.3", "1-2", "1_0")]
-    [Measured(value=0.005, unit='m', per=0), Measured(value=2.0, unit='rad', per=2), \
-Measured(value=0.3, unit=None, per=0), None, None]
+    [ParsedNumber(value=0.005, unit='m', per=0), ParsedNumber(value=2.0, unit='rad', per=2), \
+ParsedNumber(value=0.3, unit=None, per=0), None, None]
     """
     plain = text.strip(" \t\r\n").lower()
     plain = plain.replace("°", "deg").replace("π", "pi").replace("²", "2")
