@@ -25,7 +25,7 @@ from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.robot import _INSIDE, Robot
 from urdfkin.verify import verifier
-from urdfkin.verify.certificate import BatchComparison
+from urdfkin.verify.comparison import BatchComparison
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import PinocchioOracle
 from urdfkin.verify.quantities import QUANTITIES, Quantity

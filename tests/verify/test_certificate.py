@@ -17,7 +17,8 @@ import urdfkin
 from tests.laws.subjects import state
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
-from urdfkin.verify.certificate import NOT_ASKED_FOR, BatchComparison, Certificate
+from urdfkin.verify.certificate import NOT_ASKED_FOR, Certificate
+from urdfkin.verify.comparison import BatchComparison
 
 FRAME = "panda_hand"
 
@@ -179,9 +180,7 @@ def test_a_share_that_is_no_number_is_kept_in_a_sum_of_comparisons(other: float)
         assert np.isnan(both.worst)
         assert not both.agrees
         assert both.results == 3
-    assert (
-        (wrong + BatchComparison.of_nothing()).index == (BatchComparison.of_nothing() + wrong).index == (3,)
-    )
+    assert (wrong + BatchComparison()).index == (BatchComparison() + wrong).index == (3,)
 
 
 def test_a_sum_of_equal_comparisons_has_the_index_of_the_first() -> None:

@@ -55,12 +55,13 @@ from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.lengths import State
 from urdfkin.kinematics.number_kinds import Length, counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
+from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS, of_joints
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.comparison import KERNELS
 
+#: Module of the compiled functions that check results.
+KERNELS = "urdfkin.verify.kernels"
 _UNTURNED = np.eye(3).ravel()
 #: Indices of position, velocities and accelerations in a moving base's state.
 _OF_BASE = 9, 12, 15, 18, 21
@@ -696,17 +697,3 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
             own[:3] |= not column[ColumnField.TURNS] or has_lever[column[ColumnField.STEP]]
             own[3:] |= column[ColumnField.TURNS] == 1
     return found
-
-
-def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
-    """Return |ours - theirs| in multiples of eps * scale.
-
-    The result is inf if the scale is 0 and the results differ. The result is also inf if `ours`, `theirs` or
-    the scale is not finite.
-    """
-    unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, LEAST_UNIT), 0.0)
-    with np.errstate(all="ignore"):
-        difference = np.abs(ours - theirs)
-        units = difference / unit
-    units = np.where(difference == 0.0, 0.0, units)
-    return np.where(np.isfinite(difference) & np.isfinite(bound.scale), units, np.inf)

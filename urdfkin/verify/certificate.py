@@ -1,7 +1,4 @@
-"""Certificates, which record the checked and the unchecked results of a robot.
-
-The module also compares results within a bound, and defines the exception `VerificationError`.
-"""
+"""Certificates, which record the checked and the unchecked results of a robot, and `VerificationError`."""
 
 from __future__ import annotations
 
@@ -19,8 +16,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import Count, DocumentKind, Header, Size, plain, says
 from urdfkin.system.files import at_home, write_file
 from urdfkin.system.locks import lock_over_forks
-from urdfkin.verify.bounds import Bound, result_k
-from urdfkin.verify.comparison import worst_of_each
+from urdfkin.verify.comparison import BatchComparison
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
@@ -75,64 +71,6 @@ class VerificationError(UrdfkinError):
         self.quantity, self.frame, self.reference, self.index = quantity, frame, reference, index
         self.ours, self.theirs, self.bound = ours, theirs, bound
         self.units, self.reproduce = units, reproduce
-
-
-@dataclass(frozen=True, slots=True)
-class BatchComparison:
-    """Comparison of a batch of urdfkin's results (matrices or six-vectors) with the oracle's results.
-
-    Attributes:
-        worst: Largest difference of two numbers, in multiples of eps * scale.
-        share: Largest ratio of a difference to its bound; above 1 is a failure.
-        index: Indices, in the array of results, of the result with the largest ratio `share`.
-    """
-
-    results: int
-    worst: float
-    share: float
-    index: tuple[int, ...]
-
-    @classmethod
-    def of_nothing(cls) -> BatchComparison:
-        """Return the comparison of an empty batch, which agrees."""
-        return cls(0, 0.0, 0.0, ())
-
-    def __add__(self, other: BatchComparison) -> BatchComparison:
-        """Combine the comparisons of two batches.
-
-        The `index` is the index from the batch with the larger ratio `share`. A ratio of NaN counts as larger
-        than any number.
-        """
-        second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
-        first, second = (other, self) if second_is_larger else (self, other)
-        return BatchComparison(
-            self.results + other.results,
-            float(np.maximum(self.worst, other.worst)),
-            first.share,
-            first.index or second.index,
-        )
-
-    @property
-    def agrees(self) -> bool:
-        """Whether every difference is within its bound."""
-        return self.share <= 1.0
-
-
-def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:
-    """Compare results of urdfkin and of the oracle; the first `axes` axes are not axes of one result.
-
-    For placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
-    """
-    return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
-
-
-def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare the largest difference of each result, in multiples of eps * scale, with the result's bound."""
-    if not units.size:
-        return BatchComparison.of_nothing()
-    share = units / result_k(bound, units.shape)
-    index = np.unravel_index(int(share.argmax()), share.shape)
-    return BatchComparison(units.size, float(units.max()), float(share.max()), tuple(int(i) for i in index))
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,7 +257,7 @@ class Account:
             unchecked results that the evaluator has returned.
     """
 
-    checked: BatchComparison = field(default_factory=BatchComparison.of_nothing)
+    checked: BatchComparison = field(default_factory=BatchComparison)
     unchecked: int = 0
     not_asked_for: int = 0
     counters: list[tuple[IntArray, int]] = field(default_factory=list)

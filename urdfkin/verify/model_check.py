@@ -21,7 +21,7 @@ from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame
 from urdfkin.urdf.foreign import Modelled
 from urdfkin.verify.bounds import Bound, magnitudes
-from urdfkin.verify.certificate import compare
+from urdfkin.verify.comparison import compare
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import MOST_RATES, pinocchio, version
 from urdfkin.verify.quantities import PLACEMENT

@@ -51,7 +51,7 @@ from urdfkin.errors.numbers import parse_float, parse_quantity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, LinkFrame, Mimic
 from urdfkin.system.plain_xml import plain_xml
-from urdfkin.verify.comparison import KERNELS
+from urdfkin.verify.bounds import KERNELS
 
 #: An array of indices, for example in urdfkin's v for Pinocchio's joint velocities.
 Places = np.ndarray[Any, np.dtype[np.int64]]

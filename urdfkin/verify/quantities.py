@@ -15,6 +15,7 @@ acceleration qva (6,)
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from urdfkin.compiled.plan import CompiledTree
     from urdfkin.model.reference import Reference
     from urdfkin.model.tree import FloatArray
+    from urdfkin.urdf.sources import Origin
     from urdfkin.verify.bounds import Bound, Magnitudes
     from urdfkin.verify.oracle import Oracle, QueryBatch
 
@@ -387,3 +389,20 @@ def quantity(name: str) -> Quantity:
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)
     return found
+
+
+def replay_line(
+    origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
+) -> str:
+    """Return the shell command that computes one case again; its digits determine each number exactly.
+
+    >>> from urdfkin.urdf.sources import Origin
+    >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
+    "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"
+    """
+    words = ["urdfkin", command, origin.words, "--frame", shlex.quote(frame)]
+    if reference:
+        words += ["--reference", reference]
+    for letter, numbers in values.items():
+        words += [f"--{letter}", ",".join(repr(float(x)) for x in numbers) or "neutral"]
+    return " ".join(words)

@@ -23,23 +23,21 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import own_version
 from urdfkin.urdf.sources import Origin
-from urdfkin.verify import bounds
-from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.bounds import KERNELS, Bound, magnitudes
 from urdfkin.verify.call import Call, Part
-from urdfkin.verify.certificate import (
+from urdfkin.verify.certificate import Certificate, Ledger, VerificationError
+from urdfkin.verify.comparison import (
+    CHECKS,
     BatchComparison,
-    Certificate,
-    Ledger,
-    VerificationError,
     compare,
     comparison_of,
+    disagreement,
+    worst_of_each,
 )
-from urdfkin.verify.comparison import CHECKS, KERNELS, worst_of_each
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary, OracleName, oracle_library
 from urdfkin.verify.pinocchio import build_model, pinocchio, version
-from urdfkin.verify.quantities import QUANTITIES, Quantity
-from urdfkin.verify.replay import replay_line
+from urdfkin.verify.quantities import QUANTITIES, Quantity, replay_line
 
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
@@ -218,7 +216,7 @@ class Verifier:
             ledger.unchecked(quantity.name, call.results, reason)
             return
         results = call.question.flat(result, quantity.axes)
-        total, worst = BatchComparison.of_nothing(), None
+        total, worst = BatchComparison(), None
         for part in parts(wanted, call.n, results[:1].size):
             comparison, failure = self._compare(quantity, call, results[part], part)
             if failure is not None and (worst is None or comparison.share > total.share):
@@ -297,7 +295,7 @@ class Verifier:
             ours=ours[i, f],
             theirs=theirs[i, f],
             bound=EPS * bound.k * bound.scale,
-            units=float(bounds.disagreement(ours[i, f], theirs[i, f], bound).max()),
+            units=float(disagreement(ours[i, f], theirs[i, f], bound.scale).max()),
             reproduce=self._replay(quantity, call, k, call.frames[f]),
             oracle=self.library.title,
         )
