@@ -155,7 +155,7 @@ def test_pinocchios_jacobians_in_blocks_have_the_bits_of_those_at_once(
         query = QueryBatch(frames, (robot.sample(n, 1),), "world")
         at_once = oracle.jacobians(query)
         with monkeypatch.context() as patch:
-            patch.setattr(pinocchio, "_AT_A_TIME", size)
+            patch.setattr(pinocchio, "_BLOCK_SIZE", size)
             blocks = [block.copy() for block in oracle.jacobian_blocks(query)]
         assert np.concatenate(blocks).tobytes() == at_once.tobytes()
         assert len(blocks) == 1 or all(block.size <= max(size, at_once[0].size) for block in blocks)
