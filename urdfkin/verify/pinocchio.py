@@ -365,7 +365,7 @@ class PinocchioOracle(Oracle):
         return self._layout.couple(coupled_j.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def screws(self, x: QueryBatch) -> FloatArray:
-        """Return the columns (n, 6, columns) of `data.J` after `computeJointJacobians`, also of mimic joints."""
+        """Return the columns (n, 6, columns) of `data.J` after `computeJointJacobians`, mimic joints too."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
         # Pinocchio 4.1 crashes the process if nv is 0, and returns a vector if nv is 1.
