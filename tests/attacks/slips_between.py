@@ -53,7 +53,7 @@ MODULES = (
     "compiled.evaluate", "compiled.plan", "model.reference", "robot",
     "kinematics.rotation", "kinematics.inputs",
     "model.path", "model.tree", "urdf.reader", "urdf.writer",
-    "verify.bounds", "verify.derived", "verify.certificate", "verify.comparison", "verify.analytical_reference",
+    "verify.bounds", "verify.derived", "verify.certificate", "verify.analytical_reference",
     "verify.quantities", "verify.tables", "verify.verifier",
 )  # fmt: skip
 
