@@ -109,7 +109,7 @@ def test_the_worst_sample_is_named_in_whatever_part_it_stands(
         q[(*other, 7)] = MARK
         q[(*worst, 7)] = MARK + 1e-4
         for size in SIZES:
-            monkeypatch.setattr(verifier, "_AT_A_TIME", size)
+            monkeypatch.setattr(verifier, "_PART_SIZE", size)
             for quantity, compute in calls(fresh, q, v, a, motion, True).items():
                 with pytest.raises(urdfkin.VerificationError) as caught:
                     compute()
@@ -130,7 +130,7 @@ def test_the_certificate_does_not_depend_on_the_parts(
     found = list[Certificate]()
     q, v, a = batch(fresh, shape)
     for size in SIZES:
-        monkeypatch.setattr(verifier, "_AT_A_TIME", size)
+        monkeypatch.setattr(verifier, "_PART_SIZE", size)
         fresh.verifier.ledger = type(fresh.verifier.ledger)()
         for compute in calls(fresh, q, v, a, moving(base), True).values():
             compute()
@@ -175,7 +175,7 @@ def test_a_robot_without_moving_joints_has_jacobians_without_columns_in_blocks_t
 def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, size: int, base: tuple[int, ...] | None
 ) -> None:
-    monkeypatch.setattr(verifier, "_AT_A_TIME", size)
+    monkeypatch.setattr(verifier, "_PART_SIZE", size)
     q, v, a = batch(fresh, (250,))
     for compute in calls(fresh, q, v, a, moving(base), "sample").values():
         compute()

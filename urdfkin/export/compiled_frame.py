@@ -354,7 +354,7 @@ class CompiledFrame:
         drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
         call = self._call((drawn.q, drawn.v, drawn.a)[: len(row.inputs)])
         verifier.check(
-            row, call, call.in_shape(self._run_call(made, row, call, None, 1)), verifier.wanted(None)
+            row, call, call.in_shape(self._run_call(made, row, call, None, 1)), verifier.policy_of_call(None)
         )
         return made
 

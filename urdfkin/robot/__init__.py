@@ -812,7 +812,7 @@ class Robot(Displayable):
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
-        self.verifier.ready(verify)
+        self.verifier.require_pinocchio(verify)
         T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)
         T = seen_from(T_world[:, -1:], T_world[:, :-1], to)
         result = call.in_shape(T) if out is None else out
@@ -1103,8 +1103,8 @@ class Robot(Displayable):
         options: dict[str, Any] = {"representation": representation, "nearest": nearest}
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
-        self.verifier.ready(verify)
-        if self.verifier.wanted(verify):
+        self.verifier.require_pinocchio(verify)
+        if self.verifier.policy_of_call(verify):
             nearest = max(nearest, nearest_singularity(call.plan))
         rows = 7 if representation == "quaternion" else 6
         to = call.flat(out, (rows, self.nv))
@@ -1174,7 +1174,7 @@ class Robot(Displayable):
 
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
-        self.verifier.ready(verify)
+        self.verifier.require_pinocchio(verify)
         to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
         parts: AccelerationBreakdown = call.compute(
@@ -1503,7 +1503,7 @@ class Robot(Displayable):
             slide=as_str(slide, "slide"),
             like=like,
         )
-        if self.verifier.wanted(verify):
+        if self.verifier.policy_of_call(verify):
             self.verifier.table(table)
         return table
 
@@ -1532,7 +1532,7 @@ class Robot(Displayable):
             from urdfkin.verify.chain_checks import check_screws
 
         found = screws_of(self.chain(tip, base))
-        if self.verifier.wanted(verify):
+        if self.verifier.policy_of_call(verify):
             check_screws(self.verifier, found)
         return found
 
@@ -1554,7 +1554,7 @@ class Robot(Displayable):
             from urdfkin.dh.tree_parameters import tree_parameters
 
         parameters = tree_parameters(self.tree)
-        if self.verifier.wanted(verify):
+        if self.verifier.policy_of_call(verify):
             self.verifier.tree_parameters(parameters)
         return parameters
 
@@ -1596,8 +1596,11 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)
         to = call.flat(out, row.own_shape(self.nv))
-        self.verifier.ready(verify)
-        flat, read = (call.plan, (call.q, *call.rates), call.reference), self.verifier.wanted(verify) is True
+        self.verifier.require_pinocchio(verify)
+        flat, read = (
+            (call.plan, (call.q, *call.rates), call.reference),
+            self.verifier.policy_of_call(verify) is True,
+        )
         how = {"base": call.state, "out": to, "threads": threads, "read": read}
         found = call.compute(row.ours, *flat, **how, **options)
         result = call.in_shape(found) if out is None else out
