@@ -17,7 +17,7 @@ import urdfkin
 from tests.laws.subjects import state
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
-from urdfkin.verify.certificate import NOT_ASKED_FOR, Certificate
+from urdfkin.verify.certificate import CHECK_TURNED_OFF, Certificate
 from urdfkin.verify.comparison import BatchComparison
 
 FRAME = "panda_hand"
@@ -78,7 +78,7 @@ def test_each_way_of_asking_is_counted(robot: Robot) -> None:
     assert counts(robot)["placement"] == (1 + 2, 3 + 1 + len(robot.link_names) + 7 + 5)
     robot.velocity(one[0], np.repeat(v, 4, axis=0), FRAME)
     assert counts(robot)["velocity"] == (0, 3 + 4)
-    assert robot.certificate().not_verified == (NOT_ASKED_FOR,)
+    assert robot.certificate().not_verified == (CHECK_TURNED_OFF,)
 
 
 def test_what_was_refused_is_not_counted(robot: Robot) -> None:
