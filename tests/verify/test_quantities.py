@@ -249,6 +249,6 @@ def test_more_configurations_than_memory_holds_are_refused_in_one_line() -> None
         robot.sample(10**15)
     assert str(caught.value) == (
         "ur5: this number of configurations does not fit into memory: found n = 1000000000000000, which are "
-        "48000000 GB; draw them in parts, each with a seed of its own"
+        "48000000 GB; draw several smaller samples, each with another seed"
     )
     assert caught.value.__cause__ is None

@@ -139,15 +139,6 @@ def test_a_prepared_frame_checks_if_asked_and_so_does_its_copy() -> None:
         robot.prepare("panda_hand", verify="sample")  # type: ignore[arg-type]
 
 
-def test_a_robot_that_pinocchio_cannot_check_is_computed_with_a_warning() -> None:
-    robot = urdfkin.load("planar_two_link")
-    robot.verifier.unverifiable = "a reason"
-    for _ in range(2):
-        with pytest.warns(urdfkin.NotVerifiedWarning, match="a reason"):
-            robot.jacobian(np.zeros(2))
-    assert entries(robot)["jacobian"][0::3] == (0, 2)
-
-
 @pytest.mark.parametrize("name", ["panda", "ur5", "talos"])
 def test_a_checked_jacobian_takes_few_calls_of_functions(name: str) -> None:
     robot = urdfkin.load(name)

@@ -98,7 +98,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     if (kernel := preload.kernel("worst", home=KERNELS)) is None:
         begin = time.thread_time()
         scale_of_each = size if len(size) == n else size[np.arange(n) % len(size)]
-        worst = disagreement(one, other, scale_of_each).max(axis=1, initial=0.0)
+        worst: FloatArray = disagreement(one, other, scale_of_each).max(axis=1, initial=0.0)
         preload.spend("worst", time.thread_time() - begin)
     else:
         worst = units = unit = np.empty(n)

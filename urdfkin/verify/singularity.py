@@ -209,8 +209,8 @@ class _Explanation:
         if len(motions) == 1:
             yield self._null_motion(motions[0, self._moving])
         else:
-            moved = self._without_noise(motions)[:, self._moving].any(axis=0)
-            joints = _listed([name for name, moves in zip(self._names, moved, strict=True) if moves])
+            moved = np.flatnonzero(self._without_noise(motions)[:, self._moving].any(axis=0))
+            joints = _listed([self._names[i] for i in moved])
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
     def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
