@@ -164,14 +164,13 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
     ids=repr,
 )
 def test_what_is_no_numbers_is_refused(panda: Robot, value: Any) -> None:
-    no_numbers = "must be real numbers|needs 8 numbers|unknown pose 'abc'|must be finite|wrong length"
-    for compute in (
-        lambda: panda.placement(value, "panda_hand"),
-        lambda: panda.velocity(np.zeros(8), value, "panda_hand"),
-        lambda: panda.from_pinocchio(value),
-    ):
-        with pytest.raises(UrdfkinError, match=no_numbers):
-            compute()
+    no_numbers = "must be real numbers|needs 8 numbers"
+    with pytest.raises(UrdfkinError, match=f"q ({no_numbers})|unknown pose 'abc'"):
+        panda.placement(value, "panda_hand")
+    with pytest.raises(UrdfkinError, match=f"v ({no_numbers})|unknown pose 'abc'"):
+        panda.velocity(np.zeros(8), value, "panda_hand")
+    with pytest.raises(UrdfkinError, match=r"q must be (real numbers|finite)|wrong length"):
+        panda.from_pinocchio(value)
 
 
 def test_a_wrong_length_names_the_joints_and_pinocchios_numbers_must_be_finite(panda: Robot) -> None:

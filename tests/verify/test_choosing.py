@@ -1,4 +1,4 @@
-"""A check in parts, or of a sample, says what a check of everything at once says."""
+"""A check in parts, or of a sample, has the result of a check of all configurations at once."""
 
 from __future__ import annotations
 
@@ -20,17 +20,16 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import PLACEMENT, Quantity
 from urdfkin.verify.verifier import SAMPLE, Verify, parts
 
-#: Numbers of a part: one configuration at a time, a few, and all.
+#: Numbers of values in a part: of one configuration, of a few, and of all.
 SIZES = (1, 200, 10**9)
 FRAMES = ("panda_hand", "panda_link2", "panda_link7")
-#: The number that marks configurations about which Pinocchio is made to lie.
+#: Value of the finger joint that marks the configurations with a wrong result of Pinocchio.
 MARK = 0.123456
 
 
 def calls(
     robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None, verify: Verify
 ) -> dict[str, Callable[[], FloatArray]]:
-    """One call for each quantity; two of them are of several frames."""
     asked: dict[str, Any] = {"base": base, "verify": verify}
     return {
         "placement": lambda: robot.placement(q, FRAMES, **asked),
@@ -43,7 +42,6 @@ def calls(
 
 
 def moving(shape: tuple[int, ...] | None) -> BaseMotion | None:
-    """A base that moves, and elsewhere in each configuration, unless there is none."""
     if shape is None:
         return None
     generator = np.random.default_rng(8)
@@ -63,7 +61,7 @@ def panda() -> Robot:
 
 @pytest.fixture
 def fresh(panda: Robot) -> Robot:
-    """The same with an empty ledger; Pinocchio's models are kept."""
+    """Empty the ledger, without building Pinocchio's models again."""
     panda.verifier.ledger = type(panda.verifier.ledger)()
     panda._prepared.clear()
     return panda
@@ -71,13 +69,13 @@ def fresh(panda: Robot) -> Robot:
 
 @pytest.fixture
 def lies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pinocchio is off by a millionth where the finger stands at the mark, and by more where it is beyond."""
+    """Add a relative error of 1e-6 to Pinocchio's results at `MARK`, and a larger error beyond `MARK`."""
     right = verifier.oracle_results
 
     def wrong(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
         theirs, finger = right(quantity, oracle, asked), asked.inputs[0][:, 7]
         size = np.where(np.abs(finger - MARK) < 1e-3, 1e-6 + np.abs(finger - MARK), 0.0)
-        # Numbers that must agree exactly stay as they are: wherever they do not, there is nothing worse.
+        # The last row of a placement must be exact: any error in this row would be the worst.
         rows = theirs[..., :3, :] if quantity is PLACEMENT else theirs
         rows *= 1.0 + size.reshape(-1, *[1] * (theirs.ndim - 1))
         return theirs

@@ -1,4 +1,4 @@
-"""A check of one configuration, prepared or for many frames: the same comparison within the same bound."""
+"""The check of one configuration has the comparison and the bound of the check of a batch."""
 
 import cProfile
 import pickle
@@ -57,13 +57,13 @@ def test_a_single_call_records_the_numbers_that_the_check_of_a_batch_records(nam
                 assert one.tobytes() == other.tobytes()
                 assert entries(prompt) == entries(usual)
     assert prompt.certificate().verified
-    # The first call of each method, too, was made by the function for single calls.
+    # Even the first call of each method used the function for single configurations.
     fast = prompt._checked[frame]
     assert all(getattr(fast, f"_{method}").__name__ == "compute_and_check" for method in METHODS)
 
 
 def planted(robot: Robot, method: str, place: int, by: float) -> Any:
-    """The checked function of a method whose computation returns one wrong number; by 0, the next double."""
+    """Return the checked function of a method with one number that is wrong by `by`; 0: by one double."""
     frame = robot.tip_frame
     plan = robot.plan([robot.tree.frame_link(frame)])
     compute, _ = single(method, plan, Reference.LOCAL_WORLD_ALIGNED)
