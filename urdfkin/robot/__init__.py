@@ -64,7 +64,7 @@ from urdfkin.verify.quantities import (
     recursive_quantities,
 )
 from urdfkin.verify.singular_values import SingularValues, singular_values
-from urdfkin.verify.singularity import columns_of
+from urdfkin.verify.singularity import FrameColumns, axis_kinds
 from urdfkin.verify.verifier import Verifier, Verify
 
 if TYPE_CHECKING:
@@ -1053,10 +1053,16 @@ class Robot(Displayable):
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
         error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
         active = movable(call.plan)[0]
-        columns = columns_of(
-            self.tree, J, error, frame, self.rate_names, active, partial(self._sampled, frame),
+        columns = FrameColumns(
+            J,
+            error,
+            str(frame),
+            self.rate_names,
+            axis_kinds(self.tree),
+            active,
+            partial(self._sampled, frame),
             moving_base=base is not None,
-        )  # fmt: skip
+        )
         return singular_values(J, error, active[which].any(axis=0), which, columns)
 
     def analytical_jacobian(

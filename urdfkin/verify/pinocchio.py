@@ -291,11 +291,13 @@ class PinocchioOracle(Oracle):
         return self._six(x, 3, self._pin.getFrameClassicalAcceleration)
 
     def _six(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
-        model, data, ids, wanted = self._model, self.data, self._ids(x), self._reference(x.reference)
-        steps = self._each(self._pin.forwardKinematics, self._inputs(x, count))
-        return _stacked(
-            lambda n: [get(model, data, one, wanted).vector for _ in islice(steps, n) for one in ids],
-            *(len(x.q), len(ids), 6),
+        return self._collected(
+            (6,),
+            self._inputs(x, count),
+            self._pin.forwardKinematics,
+            lambda *arguments: get(*arguments).vector,
+            self._ids(x),
+            self._reference(x.reference),
         )
 
     def jacobians(self, x: QueryBatch) -> FloatArray:

@@ -62,25 +62,15 @@ class FrameColumns:
     moving_base: bool
 
 
-def columns_of(
-    tree: KinematicTree,
-    J: FloatArray,
-    error: FloatArray,
-    frame: str,
-    joints: Sequence[str],
-    active: NDArray[np.bool_],
-    samples: Callable[[], FloatArray],
-    *,
-    moving_base: bool,
-) -> FrameColumns:
-    """Return a Jacobian with its names; `FrameColumns` describes the arguments."""
-    turns: list[bool | None] = [None] * len(joints)
+def axis_kinds(tree: KinematicTree) -> tuple[bool | None, ...]:
+    """Return `FrameColumns.turns` of a robot."""
+    turns: list[bool | None] = [None] * tree.nv
     moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
     for i, joint in moving:
         at = tree.v_index[i]
         if joint.kind.nv == 1 and sum(tree.v_index[k] == at for k, _ in moving) == 1:
             turns[at] = joint.kind.turns
-    return FrameColumns(J, error, str(frame), tuple(joints), tuple(turns), active, samples, moving_base)
+    return tuple(turns)
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,21 +116,23 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     own_v, own_a = samples.v[:, columns], samples.a[:, columns]
     motion = relative_motion(oracle, tree, table, samples)
     T = table.placement(own_q)
-    apart = _Apart(
-        np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
-        rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
-        np.abs(jacobian(table, own_q) - motion.jacobian[..., columns]),
-        _split(np.abs(acceleration(table, own_q, own_v, own_a) - motion.acceleration)),
-    )
+    differences = {
+        "placement": (
+            np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
+            rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
+        ),
+        "jacobian": _halves(jacobian(table, own_q) - motion.jacobian[..., columns]),
+        "acceleration": _halves(acceleration(table, own_q, own_v, own_a) - motion.acceleration),
+    }
     size = sizes(tree, table, samples)
     slack = _Slack(table, own_q, size)
-    units, shares = _measured(apart, size, slack)
+    units, shares = _measured(differences, size, slack)
     loss = None
     own = own_length(table)
     if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
-        _, longer = _measured(apart, size.of_length(own), slack)
+        _, longer = _measured(differences, size.of_length(own), slack)
         loss = _loss(table) if max(longer.values()) <= 1.0 else None
-    worst = (float(apart.metres.max(initial=0.0)), float(apart.radians.max(initial=0.0)))
+    worst = (float(x.max(initial=0.0)) for x in differences["placement"])
     return TableCheck(len(own_q), *worst, units, shares, bool(table.snap and table.snap.changes), loss)
 
 
@@ -153,36 +155,35 @@ def _loss(table: DHTable) -> str:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Apart:
-    metres: FloatArray
-    radians: FloatArray
-    jacobian: FloatArray
-    acceleration: tuple[FloatArray, FloatArray]
+#: Linear and angular differences of each quantity, by the name of the quantity.
+_Differences = dict[str, tuple[FloatArray, FloatArray]]
 
 
-def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, float], dict[str, float]]:
+def _measured(
+    differences: _Differences, size: Sizes, slack: _Slack
+) -> tuple[dict[str, float], dict[str, float]]:
     """Return the largest difference of each quantity, in eps * scale and as a fraction of the bound."""
     rates = size.rates**2 + size.accelerations
-    one = np.ones_like(apart.metres)
+    one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
-    J_linear, J_angular = apart.jacobian[:, :3].max(axis=1), apart.jacobian[:, 3:].max(axis=1)
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    pairs: dict[str, tuple[tuple[FloatArray, FloatArray, FloatArray | float], ...]] = {
-        "placement": ((apart.metres, size.reach, slack.metres), (apart.radians, one, slack.turn)),
+    #: Scale and slack of the linear and of the angular differences.
+    limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
+        "placement": ((size.reach, slack.metres), (one, slack.turn)),
         "jacobian": (
-            (J_linear, size.turning * reach + size.sliding, slack.jacobian[:, None] * columns),
-            (J_angular, size.turning * one[:, None], slack.turn * columns),
+            (size.turning * reach + size.sliding, slack.jacobian[:, None] * columns),
+            (size.turning * one[:, None], slack.turn * columns),
         ),
         "acceleration": (
-            (apart.acceleration[0], (size.reach + slides) * rates, slack.acceleration * rates),
-            (apart.acceleration[1], rates, 4.0 * slack.turn * rates),
+            ((size.reach + slides) * rates, slack.acceleration * rates),
+            (rates, 4.0 * slack.turn * rates),
         ),
     }
     units, shares = dict[str, float](), dict[str, float]()
-    for name, halves in pairs.items():
-        units[name] = max(_worst(x, scale * EPS) for x, scale, _ in halves)
-        shares[name] = max(_worst(x, (scale.T * size.rounding).T + allowed) for x, scale, allowed in halves)
+    for name, halves in differences.items():
+        pairs = list(zip(halves, limits[name], strict=True))
+        units[name] = max(_worst(x, scale * EPS) for x, (scale, _) in pairs)
+        shares[name] = max(_worst(x, (scale.T * size.rounding).T + more) for x, (scale, more) in pairs)
     return units, shares
 
 
@@ -306,6 +307,6 @@ class _Slack:
         self.acceleration = 2.0 * self.turn * (size.reach + 2.0) + 4.0 * self.metres
 
 
-def _split(six: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest linear number (n,) and the largest angular number (n,) of six-vectors (n, 6)."""
-    return six[:, :3].max(axis=-1), six[:, 3:].max(axis=-1)
+def _halves(six: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the largest absolute values of the linear and of the angular rows of (n, 6, ...)."""
+    return np.abs(six[:, :3]).max(axis=1), np.abs(six[:, 3:]).max(axis=1)
