@@ -8,7 +8,7 @@ import pytest
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
 from urdfkin.verify.bounds import Bound
-from urdfkin.verify.certificate import BatchComparison
+from urdfkin.verify.comparison import BatchComparison
 
 FRAMES = ("a", "b", "c")
 

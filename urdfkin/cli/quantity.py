@@ -51,8 +51,8 @@ from urdfkin.verify.quantities import (
     PLACEMENT,
     SIX,
     Quantity,
+    replay_line,
 )
-from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown

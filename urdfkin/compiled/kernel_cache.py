@@ -74,11 +74,11 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
 def cache_folder() -> Path | None:
     """Return the cache folder of compiled kernels; None if no folder is writable."""
     with importing:
-        from urdfkin.system.cache import kept_folder
+        from urdfkin.system.cache import cache_folder
 
     numba = sys.modules.get("numba")
     chosen = numba.config.CACHE_DIR if numba else os.environ.get("NUMBA_CACHE_DIR")
     python = sys.implementation.cache_tag + sys.abiflags
     versions = installed_version("numba") or "", installed_version("llvmlite") or "", python
     sources = [*Path(__file__).parent.rglob("*.py"), *Path(equations.__file__).parent.glob("*.py")]
-    return kept_folder("kernels", sorted(sources), *versions, root=Path(chosen) if chosen else None)
+    return cache_folder("kernels", sorted(sources), *versions, root=Path(chosen) if chosen else None)

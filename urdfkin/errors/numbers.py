@@ -11,13 +11,13 @@ import math
 import re
 from typing import NamedTuple
 
-#: Matching a decimal number takes time linear in the length of the text.
+#: Pattern of a decimal number; matching takes time linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WHOLE = re.compile(r"[+-]?[0-9]+")
-#: A number has at most this number of characters: Python converts long integers in quadratic time.
+#: Maximum number of characters of a number, because Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: The first pattern that matches a text determines the remedy.
+#: Pairs of a pattern and a remedy; the first pattern that matches a text determines the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
@@ -58,7 +58,7 @@ def remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: Each accepted name of a unit has a short name.
+#: Short name of a unit, by each accepted name.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),

@@ -83,7 +83,7 @@ def as_bool(value: object, name: str) -> bool:
 
 
 def safe_repr(value: object) -> str:
-    """Return the repr of a value for a message, at most 60 characters; it never raises."""
+    """Return the first 60 characters of a value's repr, or a description if the repr raises an exception."""
     try:
         return repr(value)[:60]
     except Exception:  # for example, the repr of an int with 5,000 digits raises ValueError

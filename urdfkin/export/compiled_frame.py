@@ -35,7 +35,7 @@ from urdfkin.model.configuration import draw, warn_of_degrees
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.cache import get, kept_folder, put
+from urdfkin.system.cache import cache_folder, get, put
 from urdfkin.system.locks import importing, lock_over_forks
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
@@ -62,7 +62,7 @@ def library(code: FrameCode) -> ctypes.CDLL:
         raise NoCompilerError("cc is not installed")
     text = unit(code) + _entrance(code)
     flags = (*_FLAGS, *_WHOLE_REGISTERS.get(platform.machine(), ()))
-    folder = kept_folder("library", [], text, *flags, _version(compiler), _processor())
+    folder = cache_folder("library", [], text, *flags, _version(compiler), _processor())
     data = get(folder / "machine.code") if folder else None
     if data is None:
         data = _compile(text, [compiler, *flags])
@@ -354,7 +354,7 @@ class CompiledFrame:
         drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
         call = self._call((drawn.q, drawn.v, drawn.a)[: len(row.inputs)])
         verifier.check(
-            row, call, call.in_shape(self._run_call(made, row, call, None, 1)), verifier.wanted(None)
+            row, call, call.in_shape(self._run_call(made, row, call, None, 1)), verifier.policy_of_call(None)
         )
         return made
 

@@ -38,7 +38,7 @@ def code_of_robot(
     """Return the exported code of a robot's frame; the arguments and errors are those of `Robot.export`."""
     if form not in FORMS:
         raise UnknownNameError("form", form, FORMS)
-    verify = bool(robot.verifier.wanted(verify))
+    verify = bool(robot.verifier.policy_of_call(verify))
     if form == "tree":
         return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify)
     chain = robot.dh(frame, verify=verify) if form == "dh" else robot.screws(frame, verify=verify)

@@ -164,7 +164,7 @@ def compared(
         inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
         call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
         found = evaluate(function, (call.q, *call.rates))
-        checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
+        checker.check(function.quantity, call, found, bool(checker.policy_of_call(verify)))
     return checker.certificate()
 
 

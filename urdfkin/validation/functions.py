@@ -28,7 +28,8 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import plain
 from urdfkin.validation.diagnosis import Diagnosis, Mistakes, diagnose
-from urdfkin.verify.bounds import Bound, disagreement, result_k
+from urdfkin.verify.bounds import result_k
+from urdfkin.verify.comparison import disagreement
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 from urdfkin.verify.quantities import quantity as quantity_of
@@ -354,9 +355,7 @@ class _FunctionResults:
 
     def units(self, other: FloatArray) -> FloatArray:
         """Return the differences between `found` and `other` in eps * scale; inf if not finite."""
-        with np.errstate(all="ignore"):
-            units = disagreement(self.found, other, Bound(self.scale, self.k))
-        return np.where(np.isfinite(units), units, np.inf)
+        return disagreement(self.found, other, self.scale)
 
 
 @dataclass

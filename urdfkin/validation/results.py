@@ -26,8 +26,7 @@ from urdfkin.validation.outcome import RunOutcome, ValidationVerdict, outcome
 from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
 from urdfkin.validation.timings import Clock
 from urdfkin.verify.oracles import ORACLES, version, versions
-from urdfkin.verify.quantities import QUANTITIES
-from urdfkin.verify.replay import replay_line
+from urdfkin.verify.quantities import QUANTITIES, replay_line
 
 if TYPE_CHECKING:
     from urdfkin.validation.accuracy import Judgement
