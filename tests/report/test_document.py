@@ -13,7 +13,7 @@ from tests.report.documents import arms, failing, hostile
 from urdfkin.errors import InputError, SourceError
 from urdfkin.report.reading import checked, read_document
 from urdfkin.robot.loading import load
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION
 
@@ -39,8 +39,8 @@ def test_every_other_run_keeps_to_the_schema_which_describes_everything() -> Non
     assert robot["verdict"] == "bad input"
     assert robot["model"] is None
     assert {finding["severity"] for finding in robot["findings"]} >= {"error"}
-    judged = replace(validate("panda", samples=0), judgements=(judge(load("panda"), samples=1),))
-    document = judged.as_dict()
+    report = replace(validate("panda", samples=0), studies=(accuracy_study(load("panda"), samples=1),))
+    document = report.as_dict()
     assert errors(document) == []
     assert len(document["robots"][0]["judge"]["lines"]) > 5
     strict = copy.deepcopy(VALIDATION.schema())

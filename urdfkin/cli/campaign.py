@@ -196,7 +196,7 @@ def status(context: click.Context, folder: Path) -> None:
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    if not store.has_judge:
+    if not store.has_study:
         return
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     from urdfkin.report.words import counted
@@ -250,7 +250,7 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
             whole.demand_same(other.manifest, other.folder)
         for other in others:
             say(f"{other.folder}: {whole.take(other):,} chunks copied")
-        if any(other.has_judge for other in others):
+        if any(other.has_study for other in others):
             AccuracyResult.merge(whole, others)
         counts = whole.counts()
         size = len(whole.manifest.cut)

@@ -20,11 +20,11 @@ from urdfkin.report import pages
 from urdfkin.report.figures import distributions, scene
 from urdfkin.report.words import (
     VERDICTS,
+    accuracy_words,
     check_name,
     columns,
     counted,
     in_order,
-    judged_on,
     percent,
     pinocchio,
     second_oracle_cells,
@@ -253,8 +253,8 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
             for check in in_order(robot)
             if title and "second_oracle" in check
         ],
-        "judged": pages.judged_rows(robot["judge"]) if robot["judge"] else [],
-        "judged_on": judged_on(robot["judge"]) if robot["judge"] else "",
+        "accuracy": pages.accuracy_rows(robot["judge"]) if robot["judge"] else [],
+        "accuracy_words": accuracy_words(robot["judge"]) if robot["judge"] else "",
         "many": installed(),
         "heat_heads": heads,
         "heat": heat,

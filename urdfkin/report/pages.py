@@ -16,7 +16,7 @@ from urdfkin.report.words import (
     columns,
     counted,
     in_order,
-    nearer,
+    more_accurate,
     percent,
     quantity_name,
     share_of,
@@ -249,7 +249,7 @@ def angle(value: float) -> str:
     return _READABLE.angle(value, pi="π").replace("-", "−")
 
 
-def judged_rows(judgement: ReportedAccuracy) -> list[dict[str, Any]]:
+def accuracy_rows(study: ReportedAccuracy) -> list[dict[str, Any]]:
     return [
         {
             "quantity": quantity_name(line["quantity"]),
@@ -257,9 +257,9 @@ def judged_rows(judgement: ReportedAccuracy) -> list[dict[str, Any]]:
             "numbers": line["numbers"],
             "worst": [f"{line[side]['worst']:.2f}" for side in SIDES],
             "typical": [f"{line[side]['typical']:.3f}" for side in SIDES],
-            "nearer": nearer(line),
+            "more_accurate": more_accurate(line),
         }
-        for line in judgement["lines"]
+        for line in study["lines"]
     ]
 
 

@@ -13,12 +13,12 @@ from urdfkin.errors.display import Table
 from urdfkin.report.listing import print_table
 from urdfkin.report.words import (
     SIDES,
+    accuracy_words,
     check_name,
     columns,
     counted,
     in_order,
-    judged_on,
-    nearer,
+    more_accurate,
     of_quantity,
     percent,
     pinocchio,
@@ -144,7 +144,7 @@ def _print_checks(robot: ReportedRobot, out: Console) -> None:
     print_table(out, Table(heads, rows))
 
 
-def _judged(judgement: ReportedAccuracy) -> Table:
+def _accuracy_table(study: ReportedAccuracy) -> Table:
     """Return the errors of the accuracy study, with a row for each quantity and reference frame."""
     heads = ["quantity, reference", "numbers", "worst\nurdfkin", "\nPinocchio"]
     heads += ["typical\nurdfkin", "\nPinocchio", "smaller\nerror"]
@@ -154,9 +154,9 @@ def _judged(judgement: ReportedAccuracy) -> Table:
             f"{line['numbers']:,}",
             *(f"{line[side]['worst']:.2f}" for side in SIDES),
             *(f"{line[side]['typical']:.3f}" for side in SIDES),
-            nearer(line),
+            more_accurate(line),
         ]
-        for line in judgement["lines"]
+        for line in study["lines"]
     ]
     return Table(heads, rows)
 
@@ -178,10 +178,10 @@ def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
     if robot["judge"] is not None:
         out.print(
             f"{robot['source']}: errors in eps*scale, compared with values at 50 digits;"
-            f" {judged_on(robot['judge'])}",
+            f" {accuracy_words(robot['judge'])}",
             style="bold",
         )
-        print_table(out, _judged(robot["judge"]))
+        print_table(out, _accuracy_table(robot["judge"]))
     for check in robot["checks"]:
         case = check["worst_case"]
         if case is None or not (cases or check["failed"]):

@@ -8,8 +8,8 @@ from typing import Literal
 
 from urdfkin.validation.document import (
     Document,
-    Judged,
     ReportedAccuracy,
+    ReportedAccuracyLine,
     ReportedCheck,
     ReportedRobot,
     SecondOracle,
@@ -112,24 +112,24 @@ def worst_of(robot: ReportedRobot, names: Sequence[str]) -> str:
     return units(worst(check["worst"] for check in checks), compared=bool(checks))
 
 
-def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
+def more_accurate(line: ReportedAccuracyLine) -> Literal["urdfkin", "Pinocchio", "equal"]:
     ours, theirs = line["urdfkin"]["typical"], line["pinocchio"]["typical"]
     return "equal" if ours == theirs else "urdfkin" if ours < theirs else "Pinocchio"
 
 
-def nearer_counts(lines: Sequence[Judged]) -> str:
+def more_accurate_counts(lines: Sequence[ReportedAccuracyLine]) -> str:
     """Return in words how often urdfkin's typical error is smaller than Pinocchio's, equal, or larger."""
-    counts = Counter(nearer(line) for line in lines)
+    counts = Counter(more_accurate(line) for line in lines)
     return (
         f"urdfkin is more accurate in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
         f"{counts['equal']:,}, less accurate in {counts['Pinocchio']:,}"
     )
 
 
-def judged_on(judgement: ReportedAccuracy) -> str:
+def accuracy_words(study: ReportedAccuracy) -> str:
     """Return in words the samples, the motion of the base, and the result of the accuracy study."""
-    moving = " on a moving base" if judgement.get("moving_base") else ""
-    return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
+    moving = " on a moving base" if study.get("moving_base") else ""
+    return f"{counted(study['samples'], 'sample')}{moving}; {more_accurate_counts(study['lines'])}"
 
 
 def second_oracle_title(robots: Sequence[ReportedRobot]) -> str | None:

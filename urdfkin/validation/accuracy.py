@@ -88,7 +88,7 @@ class AccuracyLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class AccuracyStudy:
     """Result of the accuracy study of one robot, with one line for each quantity and reference frame."""
 
     robot: str
@@ -98,7 +98,9 @@ class Judgement:
     moving_base: bool = False
 
 
-def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None) -> Judgement:
+def accuracy_study(
+    robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None
+) -> AccuracyStudy:
     """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
     The quantities are each link's placement, velocity, Jacobian, analytical Jacobians, Jacobian rate and
@@ -119,7 +121,7 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
     drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
     with precision(max(DIGITS, enough_digits(longest))):
-        return Judgement(
+        return AccuracyStudy(
             robot.name, samples, seed, tuple(_AccuracyBatch(robot, drawn, base).lines()), base is not None
         )
 

@@ -14,15 +14,15 @@ from dataclasses import asdict, dataclass, replace
 from urdfkin.errors import InputError
 from urdfkin.system.documents import typed
 from urdfkin.system.files import read_if_there
-from urdfkin.validation.accuracy import Judgement
+from urdfkin.validation.accuracy import AccuracyStudy
 from urdfkin.validation.answer import DamagedError, packed, unpacked
 from urdfkin.validation.manifest import LAYOUT
-from urdfkin.validation.store import JUDGE, JUDGED, Store
+from urdfkin.validation.store import STUDY_FILE, STUDY_SUFFIX, Store
 from urdfkin.verify.oracles import version
 
 
 @dataclass(frozen=True, slots=True)
-class NotJudged:
+class FailedStudy:
     reason: str
 
 
@@ -61,30 +61,30 @@ class AccuracyResult:
     def of(cls, store: Store) -> AccuracyResult | None:
         """Return the results with the latest settings; None: no accuracy study was requested."""
         try:
-            if (content := read_if_there(store.folder / JUDGE)) is None:
+            if (content := read_if_there(store.folder / STUDY_FILE)) is None:
                 return None
             settings = typed(json.loads(content), StudySettings)
         except (OSError, ValueError, RecursionError) as error:
             store.tell(
-                f"{store.folder / JUDGE} cannot be read ({type(error).__name__}): the report has no"
+                f"{store.folder / STUDY_FILE} cannot be read ({type(error).__name__}): the report has no"
                 " accuracy results"
             )
             return None
         return cls(store, settings)
 
     def begin(self) -> None:
-        self._store.write(JUDGE, (json.dumps(asdict(self._settings)) + "\n").encode())
+        self._store.write(STUDY_FILE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
-    def found(self, robot: int) -> Judgement | NotJudged | None:
-        return self._store.kept(self._key(robot), JUDGED, _read)
+    def found(self, robot: int) -> AccuracyStudy | FailedStudy | None:
+        return self._store.kept(self._key(robot), STUDY_SUFFIX, _read)
 
     def has(self, robot: int) -> bool:
         """Return whether the store has a file with the result of a robot; the file is not read."""
-        return self._store.has(self._key(robot), JUDGED)
+        return self._store.has(self._key(robot), STUDY_SUFFIX)
 
-    def keep(self, robot: int, found: Judgement | NotJudged) -> None:
+    def keep(self, robot: int, found: AccuracyStudy | FailedStudy) -> None:
         key = self._key(robot)
-        self._store.keep_part(key, JUDGED, packed(key, {"judge": found}))
+        self._store.keep_part(key, STUDY_SUFFIX, packed(key, {"judge": found}))
 
     def stamp(self, robot: int) -> str:
         """Return the sha256 of the robot's text, which identifies the text to which a result belongs."""
@@ -112,11 +112,11 @@ class AccuracyResult:
         return hashlib.sha256(json.dumps([LAYOUT, "judge", *parts], sort_keys=True).encode()).hexdigest()
 
 
-def _read(key: str, content: bytes) -> Judgement | NotJudged:
+def _read(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
     data = unpacked(key, content).get("judge")
     try:
         if isinstance(data, dict) and "reason" in data:
-            return typed(data, NotJudged)
-        return typed(data, Judgement)
+            return typed(data, FailedStudy)
+        return typed(data, AccuracyStudy)
     except ValueError as error:
         raise DamagedError(f"not an accuracy result of urdfkin ({error})") from error

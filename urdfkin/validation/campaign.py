@@ -36,7 +36,7 @@ from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
 from urdfkin.verify.pinocchio import pinocchio
 
 if TYPE_CHECKING:
-    from urdfkin.validation.accuracy import Judgement
+    from urdfkin.validation.accuracy import AccuracyStudy
 
 
 class StoreWarning(UserWarning):
@@ -205,7 +205,7 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
     collector = ResultCollector(found, manifest.cut, shares(len(found), manifest.cut))
     _Campaign(found, manifest.cut, manifest.seed, None, collector).use(store)
     reports, standing = tuple(collector.reports()), collector.standing()
-    judgements, all_judged = _judgements(store, reports)
+    studies, all_studied = _studies(store, reports)
     return ValidationReport(
         robots=reports,
         asked=len(reports),
@@ -213,22 +213,22 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
         seed=manifest.seed,
         started=manifest.started,
         seconds=sum(robot.seconds for robot in reports),
-        interrupted=standing.chunks_done < standing.chunks or not all_judged,
+        interrupted=standing.chunks_done < standing.chunks or not all_studied,
         made_by=manifest.versions,
-        judgements=judgements,
+        studies=studies,
     )
 
 
-def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Judgement | None, ...], bool]:
+def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
     """Return the accuracy results of the compared robots, and whether no result is missing."""
-    if not store.has_judge:
+    if not store.has_study:
         return (), True
-    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged
+    from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy
 
     if (results := AccuracyResult.of(store)) is None:
         return (), True
     found = [results.found(i) for i, report in enumerate(reports) if report.tallies]
-    return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
+    return tuple(None if isinstance(one, FailedStudy) else one for one in found), None not in found
 
 
 #: Compiled kernels save time for runs with more samples than this number.

@@ -231,7 +231,7 @@ class ReportedErrors(TypedDict):
     typical: Annotated[float, says("Root mean square of the errors of all values, in eps * scale.")]
 
 
-class Judged(TypedDict):
+class ReportedAccuracyLine(TypedDict):
     """Accuracy of one quantity in one reference frame."""
 
     quantity: Annotated[str, says("Name of the quantity: placement, velocity, ...")]
@@ -254,7 +254,7 @@ class ReportedAccuracy(TypedDict):
     samples: Annotated[Count, says("Number of configurations in the accuracy study.")]
     seed: Annotated[int, says("Seed of the random samples.")]
     moving_base: Annotated[bool, says("Whether the root link had a random motion.")]
-    lines: Annotated[list[Judged], says("One entry for each quantity and reference frame.")]
+    lines: Annotated[list[ReportedAccuracyLine], says("One entry for each quantity and reference frame.")]
 
 
 class Case(TypedDict):

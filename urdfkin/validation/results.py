@@ -30,7 +30,7 @@ from urdfkin.verify.quantities import QUANTITIES
 from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
-    from urdfkin.validation.accuracy import Judgement
+    from urdfkin.validation.accuracy import AccuracyStudy
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -112,7 +112,7 @@ class RobotReport:
         case = self.tallies[key].case
         return None if case is None else replay(self.origin, quantity, reference, case)
 
-    def as_dict(self, judgement: Judgement | None = None) -> dict[str, Any]:
+    def as_dict(self, study: AccuracyStudy | None = None) -> dict[str, Any]:
         return {
             "source": self.source,
             "name": self.name,
@@ -131,7 +131,7 @@ class RobotReport:
             "chains": self.portrait.chains,
             "second_reader": self.portrait.second_reader,
             "checks": [self._check(key) for key in self.tallies],
-            "judge": judgement,
+            "judge": study,
         }
 
     def _check(self, key: Key) -> dict[str, Any]:
@@ -184,7 +184,7 @@ class ValidationReport(Displayable):
         interrupted: Whether the run ended early. Finished results are included.
         made_by: Versions of urdfkin and of the oracles that computed the report; None if these are the
             installed versions.
-        judgements: Results of the accuracy study, if requested. Each compared robot has a result, or None if
+        studies: Results of the accuracy study, if requested. Each compared robot has a result, or None if
             its study failed.
     """
 
@@ -196,7 +196,7 @@ class ValidationReport(Displayable):
     seconds: float
     interrupted: bool = False
     made_by: dict[str, str] | None = None
-    judgements: tuple[Judgement | None, ...] = ()
+    studies: tuple[AccuracyStudy | None, ...] = ()
 
     def to_html(self) -> str:
         """Return the report as one offline HTML page, as `urdfkin validate --html` writes it."""
@@ -251,7 +251,7 @@ class ValidationReport(Displayable):
 
     def as_dict(self) -> Document:
         """Return the JSON document; an infinite or NaN disagreement becomes null."""
-        judgements = iter(self.judgements)  # only compared robots have an accuracy result
+        studies = iter(self.studies)  # only compared robots have an accuracy result
         document = {
             "schema": VALIDATION.name,
             "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),
@@ -267,7 +267,7 @@ class ValidationReport(Displayable):
             "interrupted": self.interrupted,
             "reason": self.outcome.reason,
             "robots": [
-                robot.as_dict(next(judgements, None) if robot.tallies else None) for robot in self.robots
+                robot.as_dict(next(studies, None) if robot.tallies else None) for robot in self.robots
             ],
         }
         return cast("Document", plain(document))

@@ -33,10 +33,10 @@ from urdfkin.validation.manifest import Manifest
 _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
-JUDGE = "judge.json"
+STUDY_FILE = "judge.json"
 #: Suffix of a file with the accuracy result of a robot.
 #: `urdfkin.validation.accuracy_store` computes the name of the file.
-JUDGED = ".judged"
+STUDY_SUFFIX = ".judged"
 _DONE, _FAILED = ".chunk", ".failed"
 
 #: Number of attempts to acquire a lock; the attempts are 0.1 s apart.
@@ -103,8 +103,8 @@ class Store:
         return self._place(key, kind).exists()
 
     @property
-    def has_judge(self) -> bool:
-        return (self.folder / JUDGE).exists()
+    def has_study(self) -> bool:
+        return (self.folder / STUDY_FILE).exists()
 
     def keep_part(self, key: str, kind: str, data: bytes) -> None:
         """Write the file with the given key atomically; the method `kept` reads this file."""
@@ -124,7 +124,7 @@ class Store:
         )
         expected = {self._place(key, kind) for key in keys for kind in (_DONE, _FAILED)}
         for place in sorted((self.folder / _CHUNKS).glob("*/*")):
-            if place not in expected and place.suffix != JUDGED:
+            if place not in expected and place.suffix != STUDY_SUFFIX:
                 self._quarantine(place, "is not used: no chunk of this campaign has this name")
 
     def counts(self) -> dict[int, tuple[int, bool]]:

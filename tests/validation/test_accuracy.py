@@ -22,10 +22,10 @@ from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.words import judged_on, nearer, nearer_counts
+from urdfkin.report.words import accuracy_words, more_accurate, more_accurate_counts
 from urdfkin.system.documents import plain
 from urdfkin.validation import accuracy
-from urdfkin.validation.accuracy import AccuracyLine, Errors, Judgement, exact_quaternion, judge
+from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, Errors, accuracy_study, exact_quaternion
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.exact import recursion as exact_recursion
 from urdfkin.verify.exact.numbers import exact, precision, read_exact
@@ -45,8 +45,8 @@ def many_digits() -> Iterator[None]:
         yield
 
 
-def demand_few_units(judged: Judgement) -> None:
-    for line in judged.lines:
+def demand_few_units(study: AccuracyStudy) -> None:
+    for line in study.lines:
         assert max(line.urdfkin.worst, line.pinocchio.worst) < 40.0, line
 
 
@@ -63,7 +63,7 @@ def test_decimals_are_read_as_they_are_written_and_as_many_bases_are_needed_as_s
     assert abs(5 * joints[2].p[0] - 2) < 1e-78
     assert not joints[2].p[0].contains(0.4)
     with pytest.raises(InputError, match="base: wrong batch shape; give one motion, or 2"):
-        judge(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
+        accuracy_study(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
 
 
 def test_it_agrees_to_far_more_digits_than_a_double_has_with_derivatives_of_the_elbow() -> None:
@@ -109,14 +109,14 @@ def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() ->
     ("name", "root_joint"), [("ur3_gripper", None), ("anymal", "floating"), ("solo8", "planar")]
 )
 def test_it_judges_followers_and_free_joints_too(name: str, root_joint: str | None) -> None:
-    demand_few_units(judge(urdfkin.load(name, root_joint=root_joint), samples=1))
+    demand_few_units(accuracy_study(urdfkin.load(name, root_joint=root_joint), samples=1))
 
 
 @pytest.mark.long
 def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
+    right = {line.quantity: line for line in accuracy_study(urdfkin.load("ur5"), samples=2).lines}
     slightly_larger(monkeypatch, "placements", 16.0)
-    found = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
+    found = {line.quantity: line for line in accuracy_study(urdfkin.load("ur5"), samples=2).lines}
     assert not right["placement"].ours_is_worse
     assert found["placement"].ours_is_worse
     assert found["placement"].urdfkin.worst == pytest.approx(16.0, rel=0.2)
@@ -125,19 +125,19 @@ def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytes
 
 @pytest.mark.long
 def test_the_same_seed_gives_the_same_judgement() -> None:
-    first, again = (judge(urdfkin.load("polar"), samples=3, seed=4) for _ in range(2))
+    first, again = (accuracy_study(urdfkin.load("polar"), samples=3, seed=4) for _ in range(2))
     assert first == again
-    assert first != judge(urdfkin.load("polar"), samples=3, seed=5)
+    assert first != accuracy_study(urdfkin.load("polar"), samples=3, seed=5)
 
 
 def test_the_digits_of_true_values_grow_with_joints_before_a_link(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(accuracy, "DIGITS", 15)  # too few for 20 joints, as 50 are for 200
-    demand_few_units(judge(urdfkin.load(make_pages.askew(20), verify=False), samples=1))
+    demand_few_units(accuracy_study(urdfkin.load(make_pages.askew(20), verify=False), samples=1))
 
 
 @pytest.mark.parametrize(("name", "samples"), [("fixed_only", 1), ("single_link", 1), ("one_joint", 0)])
 def test_where_nothing_moves_or_nothing_is_drawn_there_are_the_same_lines(name: str, samples: int) -> None:
-    lines = judge(robot_of(name), samples=samples).lines
+    lines = accuracy_study(robot_of(name), samples=samples).lines
     assert len(lines) == 15
     assert all(line.numbers == 0 for line in lines if "jacobian" in line.quantity)
 
@@ -160,7 +160,7 @@ def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
 @pytest.mark.long
 @pytest.mark.parametrize("name", ROBOTS)
 def test_urdfkin_is_never_the_worse_of_the_two_by_more_than_a_factor_of_two(name: str) -> None:
-    for line in judge(urdfkin.load(name), samples=5).lines:
+    for line in accuracy_study(urdfkin.load(name), samples=5).lines:
         assert not line.ours_is_worse, line
 
 
@@ -201,9 +201,9 @@ def test_a_moving_base_is_a_floating_joint_that_moves_alike() -> None:
 @pytest.mark.parametrize(("name", "root_joint"), [("ur3_gripper", None), ("polar", "planar")])
 def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
     robot = urdfkin.load(name, root_joint=root_joint)
-    still = judge(robot, samples=2)
+    still = accuracy_study(robot, samples=2)
     for base in (draw_base(2, np.random.default_rng(1)), BaseMotion(velocity=np.arange(6.0))):
-        moving = judge(robot, samples=2, base=base)
+        moving = accuracy_study(robot, samples=2, base=base)
         assert moving.moving_base
         assert len(moving.lines) == len(still.lines)
         assert moving.lines != still.lines
@@ -219,7 +219,7 @@ def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.Mon
         return original(self, batch_shape) * (1.0 + 1e-13)
 
     monkeypatch.setattr(recursion_base.BaseMotion, "state", off)
-    lines = judge(robot, samples=2, base=base).lines
+    lines = accuracy_study(robot, samples=2, base=base).lines
     assert all(line.ours_is_worse for line in lines if line.quantity != "analytical jacobian")
     assert max(line.pinocchio.worst for line in lines) < 40.0
 
@@ -282,7 +282,7 @@ def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_o
     robot = urdfkin.load("ur5")
 
     def lines() -> dict[str | None, AccuracyLine]:
-        return {x.reference: x for x in judge(robot, samples=2).lines if x.quantity == quantity}
+        return {x.reference: x for x in accuracy_study(robot, samples=2).lines if x.quantity == quantity}
 
     quantity = "analytical jacobian"
     right = lines()
@@ -302,17 +302,17 @@ def test_errors_that_are_the_same_double_are_equal_as_the_page_says() -> None:
     def line(ours: float, theirs: float) -> AccuracyLine:
         return AccuracyLine("placement", "", 9, Errors(1.0, ours), Errors(1.0, theirs))
 
-    judged = Judgement("arm", 1, 0, (line(0.1, 0.2), line(0.2, 0.2), line(0.3, 0.2), line(0.1, 0.1)))
-    lines = plain(judged)["lines"]
-    assert [nearer(one) for one in lines] == ["urdfkin", "equal", "Pinocchio", "equal"]
+    study = AccuracyStudy("arm", 1, 0, (line(0.1, 0.2), line(0.2, 0.2), line(0.3, 0.2), line(0.1, 0.1)))
+    lines = plain(study)["lines"]
+    assert [more_accurate(one) for one in lines] == ["urdfkin", "equal", "Pinocchio", "equal"]
     counts = "urdfkin is more accurate in 1 of 4 lines, equal in 2, less accurate in 1"
-    assert nearer_counts(lines) == counts
-    assert judged_on(plain(judged)) == f"1 sample; {counts}"
-    assert f"\n{counts}. " in make_pages.study_parts({"arm": judged})["counts"]
+    assert more_accurate_counts(lines) == counts
+    assert accuracy_words(plain(study)) == f"1 sample; {counts}"
+    assert f"\n{counts}. " in make_pages.study_parts({"arm": study})["counts"]
 
 
 def test_polar_has_as_many_equal_lines_as_its_page_says() -> None:
-    lines = plain(judge(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
+    lines = plain(accuracy_study(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
     table = make_pages.path_of("judge").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
     rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
-    assert [ours == theirs for ours, theirs in rows] == [nearer(line) == "equal" for line in lines]
+    assert [ours == theirs for ours, theirs in rows] == [more_accurate(line) == "equal" for line in lines]

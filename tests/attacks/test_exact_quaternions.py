@@ -5,7 +5,7 @@ import pytest
 
 import urdfkin
 from tests.urdfs import chain
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.exact.numbers import precision, read_exact
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
@@ -28,7 +28,7 @@ def quaternions(scale: float) -> list[str]:
 @pytest.mark.parametrize("version", ["1.1", "1.2"])
 def test_true_errors_of_robots_with_quaternions_are_rounding(version: str, scale: float) -> None:
     robot = urdfkin.load(text(quaternions(scale), f'version="{version}"'))
-    for line in judge(robot, samples=3).lines:
+    for line in accuracy_study(robot, samples=3).lines:
         assert line.urdfkin.worst < 24.0
         assert line.pinocchio.worst < 24.0
 
@@ -36,7 +36,7 @@ def test_true_errors_of_robots_with_quaternions_are_rounding(version: str, scale
 @pytest.mark.parametrize("version", ["", 'version="1.0"'])
 def test_in_files_without_them_they_are_ignored_as_they_are_by_the_two_that_are_judged(version: str) -> None:
     robot = urdfkin.load(text(['rpy="0.1 0.2 0.3" quat_xyzw="0 0 0.6 0.8"'], version))
-    for line in judge(robot, samples=3).lines:
+    for line in accuracy_study(robot, samples=3).lines:
         assert line.urdfkin.worst < 10.0
         assert line.pinocchio.worst < 10.0
 
