@@ -43,10 +43,10 @@ def test_blocks_cover_everything_once_and_processes_share_what_is_free(
         assert [i for block in found for i in range(count)[block]] == list(range(count))
         assert max(block.stop - block.start for block in found) == most
     monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
-    assert memory.share() == 4 * GB
-    assert memory.share(4) == GB
+    assert memory.limit() == 4 * GB
+    assert memory.limit(4) == GB
     monkeypatch.setattr(memory, "_free", lambda: iter([]))
-    assert memory.share() is None
+    assert memory.limit() is None
 
 
 @pytest.mark.long
@@ -118,7 +118,7 @@ def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
     def asked(*_: object, **__: object) -> None:
         raise AssertionError("Pinocchio was asked")
 
-    monkeypatch.setattr(memory, "share", lambda processes=1: 2_000_000 // processes)
+    monkeypatch.setattr(memory, "limit", lambda processes=1: 2_000_000 // processes)
     monkeypatch.setattr(PinocchioOracle, "__init__", asked)
     monkeypatch.setattr(chunk_module, "_cache", {})
     robot = validate("talos", samples=1).robots[0]
@@ -128,22 +128,22 @@ def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
     )
     assert words in str(robot.reason)
     assert "GB needed, 0.002 GB allowed for each process" in str(robot.reason)
-    assert robot.portrait.model is not None
+    assert robot.summary.model is not None
 
 
 @pytest.mark.long
 def test_what_a_robot_needs_grows_with_the_cube_of_its_rates_and_with_its_links() -> None:
     trees = [urdfkin.load(chain(n, "revolute")).tree for n in (100, 200)]
-    needs = [memory.needed(tree, 28) for tree in trees]
+    needs = [memory.needed_bytes(tree, 28) for tree in trees]
     assert needs[1] - needs[0] >= 64 * (200**3 - 100**3)
     assert needs[0] == 64 * 100**3 + 24_000 * 101 + 12 * min(32 * 2**20, 2 * 101 * 28 * 8 * 600)
-    assert memory.needed(urdfkin.load(chain(0, "fixed")).tree, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
+    assert memory.needed_bytes(urdfkin.load(chain(0, "fixed")).tree, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
     wide = urdfkin.load(chain(100, "revolute", leaves=1000)).tree
-    assert memory.needed(wide, 28) > needs[0] + 1000 * 16_000
-    memory.demand(trees[0], 28, needs[0])
-    memory.demand(trees[0], 28, None)
+    assert memory.needed_bytes(wide, 28) > needs[0] + 1000 * 16_000
+    memory.check(trees[0], 28, needs[0])
+    memory.check(trees[0], 28, None)
     with pytest.raises(OracleError, match="not enough memory"):
-        memory.demand(trees[0], 28, needs[0] - 1)
+        memory.check(trees[0], 28, needs[0] - 1)
 
 
 @pytest.fixture
@@ -165,11 +165,11 @@ def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, st
 def test_the_machines_memory_counts_and_a_containers_own_topmost_group(
     system: Callable[[str, str], None],
 ) -> None:
-    assert memory.share() == 8_000_000 * 1024 // 2
+    assert memory.limit() == 8_000_000 * 1024 // 2
     system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
     system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
     system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
-    assert memory.share() == 1_000_000_000
+    assert memory.limit() == 1_000_000_000
 
 
 def test_the_control_groups_limits_count_less_what_they_would_give_back(
@@ -181,9 +181,9 @@ def test_the_control_groups_limits_count_less_what_they_would_give_back(
     system("cgroup/outer/memory.stat", "anon 1\ninactive_file 2000000000\n")
     system("cgroup/outer/inner/memory.max", "max\n")
     system("cgroup/outer/inner/memory.current", "1000000000\n")
-    assert memory.share() == 1_500_000_000
+    assert memory.limit() == 1_500_000_000
     system("cgroup/outer/inner/memory.max", "1500000000\n")
-    assert memory.share() == 250_000_000
+    assert memory.limit() == 250_000_000
 
 
 @pytest.mark.long
@@ -191,7 +191,7 @@ def test_a_limit_of_the_process_counts() -> None:
     """`ulimit -v`: what does not fit is told, and not found out by a MemoryError."""
     done = python(
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 * 10**9,) * 2)\n"
-        "from urdfkin.validation import memory; print(memory.share())"
+        "from urdfkin.validation import memory; print(memory.limit())"
     )
     assert 0 < int(done.stdout) < 1.5 * GB
 

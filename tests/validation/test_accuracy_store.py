@@ -16,7 +16,7 @@ from urdfkin.validation import accuracy
 from urdfkin.validation.accuracy import AccuracyStudy
 from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy, StudySettings
 from urdfkin.validation.campaign import StoreWarning, stored, validate
-from urdfkin.validation.store import Store, opened
+from urdfkin.validation.store import Store, open_store
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 STUDIED = ["planar_two_link", "double_pendulum"]
@@ -156,7 +156,7 @@ def test_a_text_that_changed_since_its_comparison_is_not_studied(study: Recorder
 
 def test_a_result_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
     validate("planar_two_link", samples=0, store=tmp_path)
-    with opened(tmp_path, Store.reading(tmp_path, pytest.fail).manifest, pytest.fail) as store:
+    with open_store(tmp_path, Store.reading(tmp_path, pytest.fail).manifest, pytest.fail) as store:
         kept = AccuracyResult(store, StudySettings(1, 0, False))
         found = accuracy.accuracy_study(load("planar_two_link"), samples=1)
         for each in (found, FailedStudy("why \ud800")):

@@ -201,7 +201,7 @@ def test_no_more_chunks_are_in_flight_than_workers_can_take(two: Cluster) -> Non
 
     def look(_: CampaignProgress) -> None:
         nonlocal most
-        most = max(most, len(two._flying))
+        most = max(most, len(two._pending))
 
     assert validate("planar_two_link", samples=1600, executor=two, progress=look).passed
     assert 2 <= most <= 2 * 2 + 4
@@ -343,7 +343,7 @@ def test_another_version_is_refused_before_any_work(two: Cluster, monkeypatch: p
     monkeypatch.setattr(cluster, "provenance", lambda: other)
     words = r"different versions of the code: found pin 4\S* on the cluster and 3"
     with pytest.raises(ClusterError, match=words):
-        cluster._demand_same(two._client)
+        cluster._check_versions(two._client)
     report = validate("planar_two_link", samples=0, executor=two)  # a worker that came later
     assert "the cluster and this machine have different versions of the code" in str(report.robots[0].reason)
 
@@ -397,4 +397,4 @@ def test_a_scheduler_that_goes_while_a_result_is_on_its_way_is_lost() -> None:
 
     there: Any = Cluster(SimpleNamespace(status="running", scheduler=None))  # type: ignore[arg-type]
     with pytest.raises(ClusterError, match="connection to the scheduler is lost"):
-        there._found(Gone(), None)
+        there._found(Gone(), None, 1)

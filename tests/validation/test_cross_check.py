@@ -16,7 +16,7 @@ from urdfkin.report.reading import checked, contradictions
 from urdfkin.validation import comparison
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
-from urdfkin.validation.error_stats import OraclePair, ThreeSides, plus, tally, three_sides
+from urdfkin.validation.error_stats import CrossCheck, OraclePair, cross_check, plus, tally
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import PinocchioOracle
@@ -26,9 +26,9 @@ FIRST = Bound(np.ones((1, 1, 1)), np.full((1, 1, 1), 4.0))
 SECOND = Bound(np.full((1, 1, 1), 2.0), np.full((1, 1, 1), 8.0))
 
 
-def asked(ours: float, pinocchios: float, second_oracle: float) -> ThreeSides:
+def asked(ours: float, pinocchios: float, second_oracle: float) -> CrossCheck:
     one, two, three = (np.full((1, 1, 1), 1.0 + x * EPS) for x in (ours, pinocchios, second_oracle))
-    return three_sides("mujoco", one, two, three, FIRST, SECOND)
+    return cross_check("mujoco", one, two, three, FIRST, SECOND)
 
 
 #: Three answers, who stands alone, and how many cases are undecided.
@@ -51,7 +51,7 @@ def test_sums_add_up_in_any_order() -> None:
     some = [asked(*answers) for answers in ((0, 4, 16), (100, 0, 0), (0, 100, 300))]
     sums = set()
     for order in itertools.permutations(some):
-        total: ThreeSides | None = None
+        total: CrossCheck | None = None
         for one in order:
             total = plus(total, one)
         sums.add(total)
@@ -103,15 +103,15 @@ def test_each_pair_is_measured_against_its_own_bound(monkeypatch: pytest.MonkeyP
     bounds: list[tuple[Bound, Bound]] = []
     own: list[Bound] = []
 
-    def sides(*given: Any) -> ThreeSides:
+    def sides(*given: Any) -> CrossCheck:
         bounds.append(given[-2:])
-        return three_sides(*given)
+        return cross_check(*given)
 
     def counted(ours: FloatArray, theirs: FloatArray, bound: Bound, *others: Any) -> Any:
         own.append(bound)
         return tally(ours, theirs, bound, *others)
 
-    monkeypatch.setattr(comparison, "three_sides", sides)
+    monkeypatch.setattr(comparison, "cross_check", sides)
     monkeypatch.setattr(comparison, "tally", counted)
     assert validate(arm(), samples=0, oracle="mujoco").passed
     assert len(bounds) == len(own) - 1 > 10  # Pinocchio's data.J is compared by itself

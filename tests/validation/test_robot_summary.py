@@ -23,7 +23,7 @@ from urdfkin.validation.campaign import validate
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_summary import MOST, chains_of
-from urdfkin.validation.timings import Clock, total
+from urdfkin.validation.timings import Timings
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 
@@ -52,12 +52,12 @@ def test_a_floating_root_has_no_table_and_time_is_told_by_whose_work_it_was() ->
     assert report.passed
     assert report.command == "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating"
     robot = validate("ur5", samples=10).robots[0]
-    assert robot.clock is not None
-    parts = robot.clock.as_dict()
+    assert robot.timings is not None
+    parts = robot.timings.as_dict()
     assert all(seconds > 0.0 for seconds in parts.values())
     np.testing.assert_allclose(sum(parts.values()), robot.seconds, rtol=0.02, atol=1e-3)
-    both = total([Clock(1.0, 2.0, 3.0, 4.0), Clock(10.0, 20.0, 30.0, 40.0)])
-    assert both == Clock(11.0, 22.0, 33.0, 44.0)
+    both = Timings(1.0, 2.0, 3.0, 4.0) + Timings(10.0, 20.0, 30.0, 40.0)
+    assert both == Timings(11.0, 22.0, 33.0, 44.0)
 
 
 @pytest.fixture

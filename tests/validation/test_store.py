@@ -21,8 +21,16 @@ from tests.attacks.test_validation_runs import Refusing
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
 from urdfkin.validation import answer, manifest, results
-from urdfkin.validation.answer import Answer, DamagedError, Failure, packed, read, unpacked, written
-from urdfkin.validation.campaign import StoreWarning, shares, stored, validate
+from urdfkin.validation.answer import (
+    Answer,
+    DamagedError,
+    Failure,
+    decode_answer,
+    encode_answer,
+    pack,
+    unpack,
+)
+from urdfkin.validation.campaign import StoreWarning, chunks_of_shard, stored, validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, chunks, run_chunk
 from urdfkin.validation.collector import CampaignProgress, Progress, ResultCollector
 from urdfkin.validation.engines import Task
@@ -182,9 +190,9 @@ def test_an_answer_is_read_back_to_the_last_bit() -> None:
     found = result()
     odd: Any = {"worst": float("inf"), "by_frame": (0.1 + 0.2, 5e-324, float("inf"))}
     tallies = {key: replace(tally, **odd) for key, tally in found.tallies.items()}
-    other = replace(found, tallies=tallies, portrait=None)
+    other = replace(found, tallies=tallies, summary=None)
     for each in (found, other, Failure(ValidationVerdict.BAD_INPUT, "no \ud800")):
-        again = read("k", written("k", each))
+        again = decode_answer("k", encode_answer("k", each))
         assert json.dumps(_plain(again)) == json.dumps(_plain(each))
 
 
@@ -200,35 +208,35 @@ def _plain(found: Answer) -> Any:
     [
         lambda body: body.pop("result"),
         lambda body: body["result"].update(samples="many"),
-        lambda body: body["result"].update(clock=None),
+        lambda body: body["result"].update(timings=None),
         lambda body: body["tallies"][0].pop(),
         lambda body: body["tallies"][0][1].update(worst="small"),
-        lambda body: body["result"]["portrait"]["model"].pop("joints"),
-        lambda body: body["result"]["portrait"]["chains"][0].update(samples=-1),
+        lambda body: body["result"]["summary"]["model"].pop("joints"),
+        lambda body: body["result"]["summary"]["chains"][0].update(samples=-1),
         lambda body: body.update(failure={"verdict": "fine", "reason": "none"}),
     ],
 )
 def test_a_chunk_of_another_layout_is_damaged_though_its_checksum_is_right(forge: Any) -> None:
-    body = unpacked("k", written("k", result()))
+    body = unpack("k", encode_answer("k", result()))
     forge(body)
     with pytest.raises(DamagedError, match="not a chunk of urdfkin"):
-        read("k", packed("k", body))
+        decode_answer("k", pack("k", body))
 
 
 def test_no_byte_of_a_chunk_can_be_changed_or_cut_off_unnoticed() -> None:
-    whole = written("k", Failure(ValidationVerdict.BAD_INPUT, "why"))
+    whole = encode_answer("k", Failure(ValidationVerdict.BAD_INPUT, "why"))
     for place in range(len(whole)):
         for bit in (1, 128):
             damaged = bytearray(whole)
             damaged[place] ^= bit
             with pytest.raises(DamagedError):
-                read("k", bytes(damaged))
+                decode_answer("k", bytes(damaged))
         with pytest.raises(DamagedError):
-            read("k", whole[:place])
+            decode_answer("k", whole[:place])
     with pytest.raises(DamagedError, match="another chunk"):
-        read("other", whole)
+        decode_answer("other", whole)
     with pytest.raises(DamagedError):
-        read("k", whole + b"\0")
+        decode_answer("k", whole + b"\0")
 
 
 @pytest.mark.slow
@@ -302,7 +310,7 @@ def test_a_tampered_manifest_is_refused_with_the_place(entry: str, value: object
 @pytest.mark.parametrize(("robots", "samples", "parts"), [(1, 1000, 3), (7, 60, 4), (2, 0, 5), (68, 1000, 9)])
 def test_the_parts_cover_everything_once(robots: int, samples: int, parts: int) -> None:
     cut = Cut(samples)
-    dealt = [shares(robots, cut, f"{i + 1}/{parts}") for i in range(parts)]
+    dealt = [chunks_of_shard(robots, cut, f"{i + 1}/{parts}") for i in range(parts)]
     for robot in range(robots):
         assert [i for part in dealt for i in part[robot]] == list(range(len(cut)))
     sizes = [sum(map(len, part)) for part in dealt]

@@ -85,7 +85,7 @@ def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pyte
     """A library's process lives on after an interrupt; what hangs in compiled code must not."""
     monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.sleeping_worker")
     started: list[Any] = []
-    right = worker_processes._interpreter
+    right = worker_processes._start_interpreter
 
     def kept(pipe: int) -> Any:
         started.append(right(pipe))
@@ -93,7 +93,7 @@ def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pyte
             raise KeyboardInterrupt
         return started[-1]
 
-    monkeypatch.setattr(worker_processes, "_interpreter", kept)
+    monkeypatch.setattr(worker_processes, "_start_interpreter", kept)
     try:
         report = validate(["ur5", "panda"], samples=0, isolate=True, jobs=2)
         assert report.interrupted
@@ -108,7 +108,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
     def none(_: int) -> None:
         raise OSError(24, "Too many open files")
 
-    monkeypatch.setattr(worker_processes, "_interpreter", none)
+    monkeypatch.setattr(worker_processes, "_start_interpreter", none)
     for how in HOW:
         report = validate(["ur5", "planar_two_link"], samples=60, **how)
         assert [robot.verdict for robot in report.robots] == [ValidationVerdict.NOT_VERIFIED] * 2
@@ -119,7 +119,7 @@ def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch
 
 @pytest.mark.long
 def test_what_does_not_start_any_more_is_done_by_those_that_are_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    right, asked = worker_processes._interpreter, 0
+    right, asked = worker_processes._start_interpreter, 0
 
     def one(pipe: int) -> Any:
         nonlocal asked
@@ -128,7 +128,7 @@ def test_what_does_not_start_any_more_is_done_by_those_that_are_up(monkeypatch: 
             raise OSError(24, "Too many open files")
         return right(pipe)
 
-    monkeypatch.setattr(worker_processes, "_interpreter", one)
+    monkeypatch.setattr(worker_processes, "_start_interpreter", one)
     for how in HOW[:2]:
         asked = 0
         assert validate(["double_pendulum", "planar_two_link"], samples=60, **how).passed
@@ -148,7 +148,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("subprocess.Popen", started)
     monkeypatch.syspath_prepend("")
     with pytest.raises(RecordedError):
-        worker_processes._interpreter(3)
+        worker_processes._start_interpreter(3)
     assert codes[0][1] == "-I"
     path = codes[0][3].partition("sys.path[:] = ")[2].partition("; from")[0]
     assert "''" not in path
@@ -166,7 +166,7 @@ def test_workers_killed_at_any_time_change_no_number(monkeypatch: pytest.MonkeyP
         return found
 
     monkeypatch.setattr(engines, "answer", remembered)
-    monkeypatch.setattr(memory, "share", lambda *_: None)  # it is part of a chunk, and free memory changes
+    monkeypatch.setattr(memory, "limit", lambda *_: None)  # it is part of a chunk, and free memory changes
     expected = numbers(validate(robots, samples=100))
     monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.canned_worker")
     monkeypatch.setenv("URDFKIN_TEST_ANSWERS", str(tmp_path))

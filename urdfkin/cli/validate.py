@@ -67,10 +67,10 @@ def judge_all(
         how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
     """
     from urdfkin.validation.accuracy_store import FailedStudy
-    from urdfkin.validation.campaign import shares
+    from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Cut
 
-    parts = shares(len(given), Cut(report.samples), shard)
+    parts = chunks_of_shard(len(given), Cut(report.samples), shard)
     here = [i for i, part in enumerate(parts) if part]
     studies: list[AccuracyStudy | None] = []
     try:
@@ -102,12 +102,12 @@ def _open_results(
         yield None
         return
     from urdfkin.validation.accuracy_store import AccuracyResult
-    from urdfkin.validation.store import Store, opened
+    from urdfkin.validation.store import Store, open_store
 
     def tell(message: str) -> None:
         say(f"urdfkin: warning: {message}", err=True)
 
-    with opened(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
+    with open_store(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
         store_results = AccuracyResult(store, settings)
         store_results.begin()
         yield store_results

@@ -46,7 +46,7 @@ def as_markdown(document: Document) -> str:
     ]
     foot = [
         "",
-        *_three_sides(document["robots"]),
+        *_cross_check_table(document["robots"]),
         "Worst disagreement for each quantity in eps·scale; rounding gives 1 to 10.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
@@ -60,7 +60,7 @@ def as_markdown(document: Document) -> str:
     return "\n".join(head + _body(robots, room) + foot)
 
 
-def _three_sides(robots: list[ReportedRobot]) -> list[str]:
+def _cross_check_table(robots: list[ReportedRobot]) -> list[str]:
     if (title := second_oracle_title(robots)) is None:
         return []
     heads = ["quantity", *map(text, second_oracle_heads(title))]

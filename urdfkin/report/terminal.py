@@ -66,7 +66,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
             " pair of libraries",
             style="bold",
         )
-        print_table(out, _three_sides(robots, title))
+        print_table(out, _cross_check_table(robots, title))
     for robot in robots:
         _print_robot(robot, out, cases=cases)
     found = outcome_of(document)
@@ -120,7 +120,7 @@ def _print_quantities(robots: Sequence[ReportedRobot], out: Console) -> None:
     print_table(out, Table(["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4)))
 
 
-def _three_sides(robots: Sequence[ReportedRobot], title: str) -> Table:
+def _cross_check_table(robots: Sequence[ReportedRobot], title: str) -> Table:
     rows = [[quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title)]
     heads = [head.replace(", ", ",\n") for head in second_oracle_heads(title)]
     return Table(["quantity", *heads], rows, left=(0, 5))

@@ -1,7 +1,7 @@
 """Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
-The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks, with
-a checksum. The name of the file is the sha256 of all data on which the numbers in the file depend.
+The file `judge.json` contains the settings. The result of each robot is a file in the folder of the chunks,
+with a checksum. The name of the file is the sha256 of all data on which the numbers in the file depend.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from urdfkin.errors import InputError
 from urdfkin.system.documents import typed
 from urdfkin.system.files import read_if_there
 from urdfkin.validation.accuracy import AccuracyStudy
-from urdfkin.validation.answer import DamagedError, packed, unpacked
+from urdfkin.validation.answer import DamagedError, pack, unpack
 from urdfkin.validation.manifest import LAYOUT
 from urdfkin.validation.store import STUDY_FILE, STUDY_SUFFIX, Store
 from urdfkin.verify.oracles import version
@@ -35,7 +35,7 @@ class StudySettings:
     moving_base: bool
 
     @property
-    def words(self) -> str:
+    def options(self) -> str:
         """The settings as command-line options."""
         moving = " --judge-moving-base" if self.moving_base else ""
         return f"--judge-samples {self.samples} --seed {self.seed}{moving}"
@@ -49,13 +49,16 @@ class AccuracyResult:
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
         """Copy missing results from other stores; raise InputError if a store has other settings."""
         theirs = [results for results in map(cls.of, others) if results is not None]
-        if theirs:
-            own = cls.of(store) or cls(store, theirs[0]._settings)
-            for results in theirs:
-                own._demand_same(results)
-            own.begin()
-            for results in theirs:
-                own._copy_missing(results)
+        if not theirs:
+            return
+        own = cls.of(store) or cls(store, theirs[0]._settings)
+        for results in theirs:
+            own._check_same(results)
+        own.begin()
+        for results in theirs:
+            for robot in range(len(store.manifest.robots)):
+                if own.found(robot) is None and (found := results.found(robot)) is not None:
+                    own.keep(robot, found)
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
@@ -76,31 +79,26 @@ class AccuracyResult:
         self._store.write(STUDY_FILE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
     def found(self, robot: int) -> AccuracyStudy | FailedStudy | None:
-        return self._store.kept(self._key(robot), STUDY_SUFFIX, _read)
+        return self._store.entry(self._key(robot), STUDY_SUFFIX, _decode)
 
     def has(self, robot: int) -> bool:
-        """Return whether the store has a file with the result of a robot; the file is not read."""
+        """Return whether the store has a file with the result of a robot, without reading the file."""
         return self._store.has(self._key(robot), STUDY_SUFFIX)
 
     def keep(self, robot: int, found: AccuracyStudy | FailedStudy) -> None:
         key = self._key(robot)
-        self._store.keep_part(key, STUDY_SUFFIX, packed(key, {"judge": found}))
+        self._store.write_entry(key, STUDY_SUFFIX, pack(key, {"judge": found}))
 
     def stamp(self, robot: int) -> str:
         """Return the sha256 of the robot's text, which identifies the text to which a result belongs."""
         return self._store.manifest.robots[robot][1]
 
-    def _copy_missing(self, other: AccuracyResult) -> None:
-        for robot in range(len(self._store.manifest.robots)):
-            if self.found(robot) is None and (found := other.found(robot)) is not None:
-                self.keep(robot, found)
-
-    def _demand_same(self, other: AccuracyResult) -> None:
+    def _check_same(self, other: AccuracyResult) -> None:
         if other._settings != self._settings:
             raise InputError(
                 "the stores have accuracy results with different options",
                 where=str(other._store.folder),
-                found=f"{other._settings.words}, and {self._settings.words} in {self._store.folder}",
+                found=f"{other._settings.options}, and {self._settings.options} in {self._store.folder}",
                 remedy="use the same options of the accuracy study for all stores",
             )
 
@@ -112,8 +110,8 @@ class AccuracyResult:
         return hashlib.sha256(json.dumps([LAYOUT, "judge", *parts], sort_keys=True).encode()).hexdigest()
 
 
-def _read(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
-    data = unpacked(key, content).get("judge")
+def _decode(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
+    data = unpack(key, content).get("judge")
     try:
         if isinstance(data, dict) and "reason" in data:
             return typed(data, FailedStudy)

@@ -20,8 +20,8 @@ from urdfkin.model.configuration import Samples
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, freed
 from urdfkin.robot import Robot
-from urdfkin.validation.error_stats import Inputs, Key, Tally, ThreeSides, tally, three_sides
-from urdfkin.validation.timings import Clock
+from urdfkin.validation.error_stats import CrossCheck, Inputs, Key, Tally, cross_check, tally
+from urdfkin.validation.timings import Timings
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import OracleLibrary
@@ -37,17 +37,17 @@ class SecondOracleModel:
     library: OracleLibrary
     oracle: Oracle
 
-    def three_sides(
+    def cross_check(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
-    ) -> ThreeSides:
+    ) -> CrossCheck:
         """Compare the results of three libraries, for the frames or joints of a block."""
-        answers = block.clock.timed("second", row.ask, self.oracle, block.asked(row, reference))
+        answers = block.timings.timed("second", row.ask, self.oracle, block.asked(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
         )
         if row.of == "joints":
             bounds = (block.part(one) for one in bounds)
-        return three_sides(self.library.name, ours, theirs, answers, *bounds)
+        return cross_check(self.library.name, ours, theirs, answers, *bounds)
 
 
 def tallies(
@@ -55,15 +55,15 @@ def tallies(
     oracle: Oracle,
     x: Samples,
     first_sample: int,
-    clock: Clock,
+    timings: Timings,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, Tally]:
     """Return the error statistics of each quantity of a robot in each reference frame.
 
-    `oracle` is Pinocchio's model. The clock receives the computing times.
+    `oracle` is Pinocchio's model. The timings receives the computing times.
     """
     found: dict[Key, Tally] = {}
-    work = robot, oracle, x, first_sample, clock
+    work = robot, oracle, x, first_sample, timings
     for frames in blocks(len(robot.all_frames), frame_bytes(len(x.q), robot.nv)):
         for key, part in _Block(*work, frames).tallies(second):
             found[key] = found[key].beside(part) if key in found else part
@@ -84,8 +84,8 @@ def blocks(count: int, size: int) -> Iterator[slice]:
 
 
 class _ComparisonBatch:
-    def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> None:
-        self.robot, self.oracle, self.x, self.first, self.clock = robot, oracle, x, first_sample, clock
+    def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings) -> None:
+        self.robot, self.oracle, self.x, self.first, self.timings = robot, oracle, x, first_sample, timings
         rows = zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True)
         self.inputs: list[Inputs] = list(rows)
 
@@ -97,9 +97,9 @@ class _Block(_ComparisonBatch):
     """The comparisons for a block of frames, and for each joint whose child link is in the block."""
 
     def __init__(
-        self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock, frames: slice
+        self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings, frames: slice
     ) -> None:
-        super().__init__(robot, oracle, x, first_sample, clock)
+        super().__init__(robot, oracle, x, first_sample, timings)
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
@@ -124,7 +124,7 @@ class _Block(_ComparisonBatch):
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
-                ours = self.clock.timed("urdfkin", row.ours, self.plan, inputs, reference)
+                ours = self.timings.timed("urdfkin", row.ours, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
                 yield self._compare(row, reference, ours, bound, second)
                 for joint in joints:
@@ -150,10 +150,10 @@ class _Block(_ComparisonBatch):
         second: SecondOracleModel | None,
     ) -> tuple[Key, Tally]:
         names = self.joint_names if row.of == "joints" else self.frames
-        theirs = self.clock.timed("pinocchio", row.ask, self.oracle, self.asked(row, reference))
+        theirs = self.timings.timed("pinocchio", row.ask, self.oracle, self.asked(row, reference))
         found = self.tally(ours, theirs, bound, names)
         if second is not None:
-            found = replace(found, three_sides=second.three_sides(self, row, reference, ours, theirs))
+            found = replace(found, cross_check=second.cross_check(self, row, reference, ours, theirs))
         return (row.name, reference.name.lower() if reference is not None else ""), found
 
 
@@ -168,7 +168,9 @@ class _Screws(_ComparisonBatch):
         robot, x = self.robot, self.x
         tree = freed(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.clock.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(1, 2)
+        theirs = self.timings.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(
+            1, 2
+        )
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):
@@ -182,7 +184,7 @@ class _Screws(_ComparisonBatch):
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
         size = magnitudes(plan, q, *still, STILL_STATE)
-        J = self.clock.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
+        J = self.timings.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T

@@ -360,7 +360,7 @@ class ReportedCheck(TypedDict):
     second_oracle: NotRequired[SecondOracle]
 
 
-class Timings(TypedDict):
+class ReportedTimings(TypedDict):
     """Computing times in seconds, summed over processes."""
 
     read: Annotated[
@@ -409,7 +409,9 @@ class ReportedRobot(TypedDict):
     results: Annotated[Count, says("Number of results compared with Pinocchio.")]
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     seconds: Annotated[float, says("Computing time of this robot, seconds.")]
-    timings: Annotated[Timings | None, says("Computing times of the parts of the validation; null: unknown.")]
+    timings: Annotated[
+        ReportedTimings | None, says("Computing times of the parts of the validation; null: unknown.")
+    ]
     model: Annotated[
         ReportedModel | None, says("Links and joints of the robot; null if the file could not be read.")
     ]

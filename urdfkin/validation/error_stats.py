@@ -3,7 +3,7 @@
 The addition of two tallies is commutative and associative, so the sum does not depend on the division of the
 samples into chunks. If two worst cases are equally bad, the sum keeps the one with the smaller sample number.
 
-With a second oracle, `ThreeSides` compares three results. Each of the three pairs of libraries has its own
+With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two
 results agree and the third one agrees with neither of them, the third one is the outlier.
 """
@@ -49,7 +49,7 @@ class OraclePair:
 
 
 @dataclass(frozen=True, slots=True)
-class ThreeSides:
+class CrossCheck:
     """Comparison of urdfkin, Pinocchio and a second oracle (`by`) for one quantity in one reference frame.
 
     Attributes:
@@ -67,9 +67,9 @@ class ThreeSides:
     alone: tuple[int, int, int] = (0, 0, 0)
     undecided: int = 0
 
-    def __add__(self, other: ThreeSides) -> ThreeSides:
+    def __add__(self, other: CrossCheck) -> CrossCheck:
         first, second, third = (a + b for a, b in zip(self.alone, other.alone, strict=True))
-        return ThreeSides(
+        return CrossCheck(
             self.by,
             self.urdfkin + other.urdfkin,
             self.pinocchio + other.pinocchio,
@@ -81,20 +81,20 @@ class ThreeSides:
         return asdict(self) | {"alone": dict(zip(SIDES, self.alone, strict=True))}
 
 
-def plus(first: ThreeSides | None, second: ThreeSides | None) -> ThreeSides | None:
+def plus(first: CrossCheck | None, second: CrossCheck | None) -> CrossCheck | None:
     return first if second is None else second if first is None else first + second
 
 
-def three_sides(
+def cross_check(
     by: str, ours: FloatArray, pinocchios: FloatArray, second_oracles: FloatArray, first: Bound, second: Bound
-) -> ThreeSides:
+) -> CrossCheck:
     """Compare three results (n, frames, ...) with each other.
 
     The bound `first` limits the difference between urdfkin and Pinocchio, `second` the difference between
     urdfkin and the second oracle.
     """
     if not ours.size:
-        return ThreeSides(by, OraclePair(), OraclePair())
+        return CrossCheck(by, OraclePair(), OraclePair())
     both = _together(first, second)
     own, units_own = _shares(ours, second_oracles, second)
     other, units_other = _shares(pinocchios, second_oracles, both)
@@ -107,7 +107,7 @@ def three_sides(
     )
     settled = np.logical_or.reduce((*alone, ours_theirs & ours_second & theirs_second))
     first_alone, second_alone, third_alone = (int(one.sum()) for one in alone)
-    return ThreeSides(
+    return CrossCheck(
         by,
         OraclePair(int((~ours_second).sum()), float(units_own.max()), float(own.max())),
         OraclePair(int((~theirs_second).sum()), float(units_other.max()), float(other.max())),
@@ -175,7 +175,7 @@ class Tally:
     by_frame: tuple[float, ...]
     case: WorstCase | None
     bounds: tuple[float, float] = (math.inf, 0.0)
-    three_sides: ThreeSides | None = None
+    cross_check: CrossCheck | None = None
 
     def __add__(self, other: Tally) -> Tally:
         cases = [case for case in (self.case, other.case) if case is not None]
@@ -188,7 +188,7 @@ class Tally:
             tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
             max(cases, key=lambda case: (case.share, -case.sample), default=None),
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
-            plus(self.three_sides, other.three_sides),
+            plus(self.cross_check, other.cross_check),
         )
 
     def beside(self, other: Tally) -> Tally:
