@@ -11,7 +11,7 @@ from urdfkin.dh.units import Units as DisplayUnits
 from urdfkin.model.configuration import range_words
 from urdfkin.model.summary import axis_words
 from urdfkin.report.words import (
-    SIDES,
+    STUDIED,
     column,
     columns,
     counted,
@@ -255,8 +255,8 @@ def accuracy_rows(study: ReportedAccuracy) -> list[dict[str, Any]]:
             "quantity": quantity_name(line["quantity"]),
             "reference": line["reference"] or "",
             "numbers": line["numbers"],
-            "worst": [f"{line[side]['worst']:.2f}" for side in SIDES],
-            "typical": [f"{line[side]['typical']:.3f}" for side in SIDES],
+            "worst": [f"{line[side]['worst']:.2f}" for side in STUDIED],
+            "typical": [f"{line[side]['typical']:.3f}" for side in STUDIED],
             "more_accurate": more_accurate(line),
         }
         for line in study["lines"]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from urdfkin.errors.display import Table
 from urdfkin.report.listing import print_table
 from urdfkin.report.words import (
-    SIDES,
+    STUDIED,
     accuracy_words,
     check_name,
     columns,
@@ -152,8 +152,8 @@ def _accuracy_table(study: ReportedAccuracy) -> Table:
         [
             line["quantity"] + (f", {line['reference']}" if line["reference"] else ""),
             f"{line['numbers']:,}",
-            *(f"{line[side]['worst']:.2f}" for side in SIDES),
-            *(f"{line[side]['typical']:.3f}" for side in SIDES),
+            *(f"{line[side]['worst']:.2f}" for side in STUDIED),
+            *(f"{line[side]['typical']:.3f}" for side in STUDIED),
             more_accurate(line),
         ]
         for line in study["lines"]

@@ -19,7 +19,7 @@ from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES
 
-SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
+STUDIED: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
 #: Verdicts, worse ones first
 VERDICTS = tuple(verdict.value for verdict in ValidationVerdict)
 

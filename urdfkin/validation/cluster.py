@@ -24,7 +24,7 @@ from distributed import Client, Future, KilledWorker, Scheduler, SpecCluster, Wo
 
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.urdf.sources import Origin
-from urdfkin.validation import remote
+from urdfkin.validation import remote, results
 from urdfkin.validation.answer import CRASHED_TWICE, Answer, Failure, crash_failure, failure, lost_failure
 from urdfkin.validation.engines import Enter, Task, Work
 from urdfkin.validation.results import provenance
@@ -159,7 +159,7 @@ def _check_versions(client: Client) -> None:
 
     The caller must not send anything to the workers or the scheduler before this check.
     """
-    for worker, found in client.run(remote.provenance, on_error="return").items():
+    for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
             remedy = f"install urdfkin {version('urdfkin')} on the worker's machine"
             raise ClusterError("a worker cannot run urdfkin", where=worker, found=str(found), remedy=remedy)
