@@ -18,6 +18,7 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, inverse
+from urdfkin.report.markdown import table_lines
 from urdfkin.report.words import counted
 from urdfkin.robot import Robot
 
@@ -239,9 +240,8 @@ def pairs_document(found: Sequence[Sameness], question: SameQuestion = EQUIVALEN
 
 
 def pairs_markdown(found: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> str:
-    rows = [PAIRS, ("---",) * len(PAIRS), *_pair_rows(found, question)]
-    lines = [f"| {' | '.join(map(markdown_text, row) if k != 1 else row)} |" for k, row in enumerate(rows)]
-    return "\n".join(lines) + "\n"
+    rows = (map(markdown_text, row) for row in _pair_rows(found, question))
+    return "\n".join([*table_lines(PAIRS, rows), ""])
 
 
 def as_document(found: Sameness) -> TextDocument:
@@ -304,10 +304,8 @@ def markdown_of(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
             lines.append("")
     frames = far_frames(found)
     if frames:
-        lines += [f"{farthest(found)}:", ""]
-        lines += [f"| {' | '.join(HEADS)} |", "| --- | ---: | ---: | ---: |"]
-        lines += [f"| {' | '.join(map(text, row))} |" for row in rows(frames[: 4 * SHOWN])]
-        lines.append("")
+        cells = (map(text, row) for row in rows(frames[: 4 * SHOWN]))
+        lines += [f"{farthest(found)}:", "", *table_lines(HEADS, cells, left=[0]), ""]
     return "\n".join([*lines, text(str(found.checked)), ""])
 
 
