@@ -1,7 +1,7 @@
-"""Report on a terminal: tables and the failures.
+"""Report on a terminal: tables and failures.
 
-A terminal of 80 columns shows two tables. A terminal of at least 100 columns shows one wide table. The text
-contains all information that the colours show.
+A terminal with less than 100 columns shows two tables; a wider terminal shows one wide table. The words
+contain all information that the colours show.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 from urdfkin.errors.display import Table
 from urdfkin.report.listing import print_table
 from urdfkin.report.words import (
-    STUDIED,
     accuracy_words,
     check_name,
     columns,
     counted,
+    error_cells,
     in_order,
     more_accurate,
     of_quantity,
@@ -39,14 +39,15 @@ from urdfkin.validation.document import Document, ReportedAccuracy, ReportedRobo
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: A terminal of this width shows a table with a column for each quantity.
+#: Minimum width of a terminal for a table with a column for each quantity.
 _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
     """Print a report; the width of the console determines the layout.
 
-    With `cases`, the command that computes each worst case again is shown. Failures always show it.
+    Each failure has the command that computes its worst case again. With `cases`, every check has this
+    command.
     """
     robots = document["robots"]
     out.print(
@@ -145,15 +146,13 @@ def _print_checks(robot: ReportedRobot, out: Console) -> None:
 
 
 def _accuracy_table(study: ReportedAccuracy) -> Table:
-    """Return the errors of the accuracy study, with a row for each quantity and reference frame."""
     heads = ["quantity, reference", "numbers", "worst\nurdfkin", "\nPinocchio"]
     heads += ["typical\nurdfkin", "\nPinocchio", "smaller\nerror"]
     rows = [
         [
-            line["quantity"] + (f", {line['reference']}" if line["reference"] else ""),
+            check_name(line),
             f"{line['numbers']:,}",
-            *(f"{line[side]['worst']:.2f}" for side in STUDIED),
-            *(f"{line[side]['typical']:.3f}" for side in STUDIED),
+            *error_cells(line),
             more_accurate(line),
         ]
         for line in study["lines"]
