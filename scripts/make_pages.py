@@ -26,7 +26,7 @@ from scripts.pages import DOCS, inserted, table
 from urdfkin.compiled.preload import only
 from urdfkin.kinematics.registry import table as equations
 from urdfkin.model.configuration import draw_base
-from urdfkin.report.words import nearer_counts
+from urdfkin.report.words import more_accurate_counts
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
@@ -34,7 +34,7 @@ from urdfkin.urdf.findings import WRITTEN_OUT, shortened
 from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.pages import page as page_of
-from urdfkin.validation.accuracy import AccuracyLine, Judgement, judge
+from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, accuracy_study
 from urdfkin.validation.document import VALIDATION
 from urdfkin.verify.exact.enclosure import Enclosures
 from urdfkin.verify.pinocchio import version
@@ -166,24 +166,25 @@ SAMPLES, ENCLOSED = 10, 5
 
 
 def study() -> dict[str, str]:
-    judgements = {
-        f"{name}: {kind}": judge(urdfkin.load(name), samples=SAMPLES) for name, kind in STUDIED.items()
+    studies = {
+        f"{name}: {kind}": accuracy_study(urdfkin.load(name), samples=SAMPLES)
+        for name, kind in STUDIED.items()
     }
     for name in MOVING:
         base = draw_base(SAMPLES, np.random.default_rng([0, 1]))
-        judgements[f"{name} on a moving base"] = judge(urdfkin.load(name), samples=SAMPLES, base=base)
-    return study_parts(judgements)
+        studies[f"{name} on a moving base"] = accuracy_study(urdfkin.load(name), samples=SAMPLES, base=base)
+    return study_parts(studies)
 
 
-def study_parts(judgements: dict[str, Judgement]) -> dict[str, str]:
-    lines = [line for judgement in judgements.values() for line in plain(judgement)["lines"]]
+def study_parts(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
+    lines = [line for study in studies.values() for line in plain(study)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
 The typical errors are compared in each line of the tables:
-{nearer_counts(lines)}. Equal errors are
+{more_accurate_counts(lines)}. Equal errors are
 the same double. The median ratio of urdfkin's typical error to Pinocchio's is
 {median(ratios):.2f}. The ratios lie between {min(ratios):.2f} and {max(ratios):.2f}."""
-    sections = [f"## {name}\n\n{_errors(judgement.lines)}" for name, judgement in judgements.items()]
+    sections = [f"## {name}\n\n{_errors(study.lines)}" for name, study in studies.items()]
     return {"counts": counts, "tables": "\n\n".join(sections)}
 
 

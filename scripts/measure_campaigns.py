@@ -25,7 +25,7 @@ from urdfkin.validation.cluster import connected
 from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.robot_input import subject
-from urdfkin.validation.store import opened
+from urdfkin.validation.store import open_store
 
 
 def store(*robots: Any, **how: Any) -> ValidationReport:
@@ -90,7 +90,7 @@ def measure_chunk() -> None:
     found = run_chunk(chunk)
     print(f"a chunk of {chunk.configurations} samples: {cost(lambda _: run_chunk(chunk), 3):.0f} ms")
     manifest = Manifest.of([robot], cut.samples, 0, "now")
-    with tempfile.TemporaryDirectory() as folder, opened(Path(folder) / "s", manifest, print) as kept:
+    with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s", manifest, print) as kept:
         print(f"time to store it: {cost(lambda i: kept.keep(0, i, found)):.2f} ms")
         print(f"time to read it: {cost(lambda i: kept.answer(0, i)):.2f} ms")
     print(f"time to add two: {cost(lambda _: found + found):.2f} ms")

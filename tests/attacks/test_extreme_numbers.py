@@ -24,7 +24,7 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.quantities import VELOCITY
 
@@ -185,7 +185,7 @@ def test_lengths_whose_squares_vanish_do_not_lose_to_rounding_and_the_judges_uni
     for convention in ("standard", "modified"):
         robot.dh("b", "a", convention)
     assert urdfkin.validate([TINY.encode()], samples=2).passed
-    for line in judge(urdfkin.load(FAINT), samples=2).lines:
+    for line in accuracy_study(urdfkin.load(FAINT), samples=2).lines:
         assert line.urdfkin.worst < 100.0, line
         assert line.pinocchio.worst < 100.0, line
 

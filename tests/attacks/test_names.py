@@ -16,7 +16,7 @@ from tests.urdfs import robot as urdf
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError, OracleError, UnknownNameError
 from urdfkin.model.tree import JointFrame, KinematicTree, LinkFrame
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.oracle import QueryBatch
 
 #: What links and joints are called here.
@@ -75,7 +75,7 @@ def test_every_frame_of_all_frames_stands_for_itself_also_in_a_validation() -> N
     for copied in (copy.deepcopy(robot.all_frames), pickle.loads(pickle.dumps(robot.all_frames))):
         assert [robot.tree.frame_link(frame) for frame in copied] == [0, 1, 2, 1, 2]
     assert urdfkin.validate([LIKE_OURS.encode()], samples=2).passed
-    assert max(line.pinocchio.worst for line in judge(loaded(LIKE_OURS), samples=1).lines) < 10.0
+    assert max(line.pinocchio.worst for line in accuracy_study(loaded(LIKE_OURS), samples=1).lines) < 10.0
 
 
 @pytest.mark.parametrize("name", ["anymal_c", "so100", "z1", "b1_z1"])

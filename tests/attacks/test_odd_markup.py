@@ -10,7 +10,7 @@ import urdfkin
 from tests.urdf.lint.cases.arm import MESH, arm
 from tests.urdfs import loaded
 from urdfkin.urdf.lint import Finding, Severity
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.view.scene import shapes
 
 UNDECLARED = "URDF214"
@@ -34,7 +34,7 @@ def test_a_follower_beside_an_undeclared_prefix_is_verified(more: str) -> None:
 @pytest.mark.slow
 def test_the_judge_and_the_viewer_read_a_file_with_an_undeclared_prefix() -> None:
     robots = (loaded(arm(follow=FOLLOWS, more=more)) for more in ("<d:x/>", ""))
-    with_prefix, without = (judge(robot, samples=2).lines[0] for robot in robots)
+    with_prefix, without = (accuracy_study(robot, samples=2).lines[0] for robot in robots)
     assert with_prefix == without
     (shape,) = shapes(loaded(arm(base=SPHERE, more="<drake:x/>")))
     assert (shape.link, shape.kind) == ("base", "sphere")

@@ -1,6 +1,6 @@
-// What the browser tests ask of a page; put into it after it has loaded.
+// Functions that the browser tests call in a page.
 window.probe = {
-  // How many pixels of the first view are drawn on, a sum that changes when they do, and how many there are.
+  // Return the number of drawn pixels of the first view, a checksum of the pixels, and the number of all pixels.
   pixels() {
     const canvas = document.querySelector("canvas"), { width, height } = canvas;
     const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
@@ -13,7 +13,7 @@ window.probe = {
     return [drawn, sum, width * height];
   },
 
-  // Pixels of joints (blue) and of bones (grey).
+  // Return the number of pixels of joints (blue) and of links (grey).
   colours() {
     const canvas = document.querySelector("canvas");
     const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -52,7 +52,7 @@ window.probe = {
     return tables.filter((table) => table.checkVisibility()).map((table) => table.caption.textContent.split(" ")[0]);
   },
 
-  // Where the first view draws the ends of its first chain for a configuration, in rows of four.
+  // Return the tip poses of the first chain in the first view for a configuration: links, standard and modified table.
   chainEnds(q) {
     const { robot } = document.querySelector("[data-view]").view, chain = robot.chains[0];
     robot.q = q;
@@ -78,7 +78,7 @@ window.probe = {
   },
   unfoldAll: () => document.querySelectorAll("details").forEach((part) => { part.open = true; }),
 
-  // Texts whose WCAG contrast with what they stand on is below 4.5.
+  // Return the number of texts, and the texts whose WCAG contrast with the background is below 4.5.
   poorContrast() {
     const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true }), known = new Map();
     const rgba = (colour) => {

@@ -186,7 +186,7 @@ def status(context: click.Context, folder: Path) -> None:
             f"remaining: {duration(missing * seconds)} on one processor, {seconds:.2g} s per chunk;"
             " divide the time by the number of processors"
         )
-    if (holder := store.at_work()) is not None:
+    if (holder := store.writing_process()) is not None:
         say(f"the store is in use by: {holder}")
     elif missing:
         say("no process is running; to resume, repeat the same `urdfkin validate ... --store` command")
@@ -196,7 +196,7 @@ def status(context: click.Context, folder: Path) -> None:
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    if not store.has_judge:
+    if not store.has_study:
         return
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     from urdfkin.report.words import counted
@@ -242,15 +242,15 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     and skipped. DIR is made if it does not exist.
     """
     from urdfkin.validation.accuracy_store import AccuracyResult
-    from urdfkin.validation.store import Store, opened
+    from urdfkin.validation.store import Store, open_store
 
     others = [Store.reading(store, _warn) for store in stores]
-    with opened(folder, others[0].manifest, _warn) as whole:
+    with open_store(folder, others[0].manifest, _warn) as whole:
         for other in others[1:]:
-            whole.demand_same(other.manifest, other.folder)
+            whole.check_same(other.manifest, other.folder)
         for other in others:
-            say(f"{other.folder}: {whole.take(other):,} chunks copied")
-        if any(other.has_judge for other in others):
+            say(f"{other.folder}: {whole.copy_missing(other):,} chunks copied")
+        if any(other.has_study for other in others):
             AccuracyResult.merge(whole, others)
         counts = whole.counts()
         size = len(whole.manifest.cut)

@@ -34,8 +34,8 @@ from urdfkin.verify.quantities import compared, not_compared
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
-    from urdfkin.validation.accuracy import Judgement
-    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged, StudySettings
+    from urdfkin.validation.accuracy import AccuracyStudy
+    from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy, StudySettings
     from urdfkin.validation.engines import Engine
     from urdfkin.validation.results import ValidationReport
 
@@ -66,31 +66,31 @@ def judge_all(
         retry: Whether to repeat the study of a robot whose study failed in an earlier run.
         how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
     """
-    from urdfkin.validation.accuracy_store import NotJudged
-    from urdfkin.validation.campaign import shares
+    from urdfkin.validation.accuracy_store import FailedStudy
+    from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Cut
 
-    parts = shares(len(given), Cut(report.samples), shard)
+    parts = chunks_of_shard(len(given), Cut(report.samples), shard)
     here = [i for i, part in enumerate(parts) if part]
-    judgements: list[Judgement | None] = []
+    studies: list[AccuracyStudy | None] = []
     try:
         with _open_results(store, settings, shard) as results:
             for i, robot in zip(here, report.robots, strict=True):
                 if not robot.tallies or parts[i].start > 0:
                     continue
                 found = None if results is None else results.found(i)
-                if found is None or (retry and isinstance(found, NotJudged)):
+                if found is None or (retry and isinstance(found, FailedStudy)):
                     found, is_lasting = _study(
                         given[i], settings, None if results is None else results.stamp(i), how
                     )
                     if results is not None and is_lasting:
                         results.keep(i, found)
-                if isinstance(found, NotJudged):
+                if isinstance(found, FailedStudy):
                     say(f"urdfkin: {robot.source}: no accuracy result: {found.reason}", err=True)
-                judgements.append(None if isinstance(found, NotJudged) else found)
+                studies.append(None if isinstance(found, FailedStudy) else found)
     except KeyboardInterrupt:
         report = replace(report, interrupted=True)
-    return replace(report, judgements=tuple(judgements))
+    return replace(report, studies=tuple(studies))
 
 
 @contextmanager
@@ -102,12 +102,12 @@ def _open_results(
         yield None
         return
     from urdfkin.validation.accuracy_store import AccuracyResult
-    from urdfkin.validation.store import Store, opened
+    from urdfkin.validation.store import Store, open_store
 
     def tell(message: str) -> None:
         say(f"urdfkin: warning: {message}", err=True)
 
-    with opened(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
+    with open_store(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
         store_results = AccuracyResult(store, settings)
         store_results.begin()
         yield store_results
@@ -115,13 +115,13 @@ def _open_results(
 
 def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
-) -> tuple[Judgement | NotJudged, bool]:
+) -> tuple[AccuracyStudy | FailedStudy, bool]:
     """Study a robot. Return the accuracy result, and whether to store it (not after a crash)."""
     import numpy as np
 
     from urdfkin.model.configuration import draw_base
-    from urdfkin.validation.accuracy import judge
-    from urdfkin.validation.accuracy_store import NotJudged
+    from urdfkin.validation.accuracy import accuracy_study
+    from urdfkin.validation.accuracy_store import FailedStudy
     from urdfkin.validation.robot_input import subject
 
     is_same = True
@@ -130,13 +130,13 @@ def _study(
         if is_same := stamp in (None, robot.stamp):
             rng = np.random.default_rng([settings.seed, 1])
             base = draw_base(settings.samples, rng) if settings.moving_base else None
-            return judge(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
+            return accuracy_study(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
         raise InputError(
             "the robot file has changed since its results were compared",
             remedy="start the validation again when the file no longer changes",
         )
     except Exception as error:
-        return NotJudged(f"{type(error).__name__}: {error}"), is_same and isinstance(error, UrdfkinError)
+        return FailedStudy(f"{type(error).__name__}: {error}"), is_same and isinstance(error, UrdfkinError)
 
 
 _T = TypeVar("_T", bound=click.Command)

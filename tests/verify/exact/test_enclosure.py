@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import urdfkin
 from tests import urdfs
-from tests.attacks.test_judged_quaternions import quaternions, text
+from tests.attacks.test_exact_quaternions import quaternions, text
 from tests.high_precision import mp, true_motion
 from tests.laws.everything import by_the_robot
 from tests.laws.subjects import robot_of, state
