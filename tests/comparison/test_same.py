@@ -216,13 +216,13 @@ def telescope(names: str, x: float) -> Robot:
 
 def test_slides_whose_names_agree_are_tried_in_no_other_order(monkeypatch: pytest.MonkeyPatch) -> None:
     tried = list[tuple[str, ...]]()
-    taken = Mechanism.in_order
+    taken = Mechanism.reordered
 
-    def in_order(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
+    def reordered(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
         tried.append(tuple(names))
         return taken(mechanism, names)
 
-    monkeypatch.setattr(Mechanism, "in_order", in_order)
+    monkeypatch.setattr(Mechanism, "reordered", reordered)
     found = urdfkin.same(telescope("abcd", 0.0), telescope("abcd", 0.001), bounds=False)
     assert found.verdict is Verdict.DIFFERS
     assert tried == []
@@ -324,7 +324,7 @@ def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
 ) -> None:
     a, b, document = compared
     asked = list[str]()
-    monkeypatch.setattr("urdfkin.comparison.certificate.tightened", lambda *_: asked.append("boxes"))
+    monkeypatch.setattr("urdfkin.comparison.certificate.tighten", lambda *_: asked.append("boxes"))
     forged = copy.deepcopy(document)
     forged["base"][0][3] += 0.25
     assert recheck(forged, a, b)

@@ -49,17 +49,17 @@ from urdfkin.model.mechanisms.mechanism import (
     MatchedValues,
     Screw,
     Variables,
-    apart,
+    pose_difference,
 )
 from urdfkin.model.mechanisms.upper_bound import (
     COARSE,
     Support,
-    at_the_frame,
-    before_it,
-    behind_first,
-    difference,
-    passed,
+    after_constant_motion,
+    after_joint,
+    d_after_joint,
+    from_first_difference,
     point,
+    start_at_frame,
 )
 from urdfkin.model.tree import FloatArray, inverse, pose
 from urdfkin.robot import Robot
@@ -102,14 +102,14 @@ class DistanceSearch:
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
         #: (4, 4) pose of B's base link in A's root frame. If A's base link moves, this pose moves with it.
-        self.hold = found.X @ found.b.homes[found.base[1]]
+        self.T_root_base = found.X @ found.b.homes[found.base[1]]
         #: For each robot: whether the base link belongs to the same rigid body as the root link.
-        self.stands = tuple(
+        self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((found.a, found.b), found.base, strict=True)
         )
         #: Whether the distances depend on the motion between B's root and the link where the matching begins.
-        #: `upper_bounds` and `tightened` do not bound this motion.
-        self.unbounded = as_written and not all(self.stands)
+        #: `upper_bounds` and `tighten` do not bound this motion.
+        self.unbounded = as_written and not all(self.base_fixed)
 
     def _ends(self, name: str) -> tuple[float, float]:
         low, high = self.variables.ranges[name]
@@ -144,7 +144,7 @@ class DistanceSearch:
             q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = line.at(values)
         return q_a, q_b
 
-    def belong_together(self, q_a: FloatArray, q_b: FloatArray) -> bool:
+    def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
         """Return whether `q_b` (1, nq) corresponds to `q_a`, and both are within the joint ranges."""
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
@@ -163,7 +163,7 @@ class DistanceSearch:
 
     def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
         """Return poses (n, frames, 4, 4) of A and of B in A's root frame, at values (n, variables)."""
-        return self.poses_at(*self.configurations(z), frames, own_results)
+        return self.poses_at(*self.configurations(z), frames, own_poses)
 
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
@@ -176,51 +176,51 @@ class DistanceSearch:
         tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
         if self.unbounded:
             return Ts_a, self.found.X @ Ts_b[:, 1:] @ tools
-        hold = self.hold
-        if not self.stands[0]:
+        hold = self.T_root_base
+        if not self.base_fixed[0]:
             link = self.found.base[0]
             moved = computed(a, q_a, [a.tree.link_frames[link]])
             hold = moved @ inverse(self.found.a.homes[link]) @ hold
         return Ts_a, hold @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
 
-    def at(
+    def distances_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
         """Return distances (n, frames) of matching frame origins (m) at configurations of A and B."""
         a, b = self.poses_at(q_a, q_b, frames, computed)
         return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
 
-    def random(self, n: int) -> FloatArray:
+    def random_values(self, n: int) -> FloatArray:
         """Return random values (n, variables) within their ranges."""
         low, high = self.ends.T
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
-    def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
+    def distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """Return the distances (n, frames) between the origins of matching frames (m)."""
-        return self.at(*self.configurations(z), frames, own_results)
+        return self.distances_at(*self.configurations(z), frames, own_poses)
 
-    def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
+    def sampled_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
         """Return distances (n, frames) at random configurations and corners, and the variables' values."""
         low, high = self.ends.T
-        z = self.random(SAMPLES)
+        z = self.random_values(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
         z = np.concatenate((np.clip(np.zeros((1, len(self.names))), low, high), corners, z))
-        return self.metres(z, frames), z
+        return self.distances(z, frames), z
 
-    def worst(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
+    def largest_distances(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
         """Return the largest distance (m) found for each frame, and the values of the variables at it."""
         found: list[tuple[float, FloatArray]] = []
         for first in range(0, len(frames), SEARCHED_TOGETHER):
             some = frames[first : first + SEARCHED_TOGETHER]
-            off, z = self.seen(some)
+            off, z = self.sampled_distances(some)
             found += self._climb(some, z[np.argsort(-off, axis=0)[:STARTS].T])
         return found
 
-    def most_turned(self, frame: FramePair) -> FloatArray:
+    def largest_rotation(self, frame: FramePair) -> FloatArray:
         """Return the sampled values (variables,) at which the frame's orientations in A and B differ most."""
-        z = self.seen([frame])[1]
+        z = self.sampled_distances([frame])[1]
         Ts_a, Ts_b = self.poses(z, [frame])
-        turned = [apart(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
+        turned = [pose_difference(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
         return np.asarray(z[int(np.argmax(turned))])
 
     def _climb(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
@@ -259,7 +259,7 @@ class DistanceSearch:
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """Return distances (frames, starts, values) for values `z` (frames, starts, values, variables)."""
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # -1 fails for a robot without variables
-        off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
+        off = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
         return np.asarray(off[n, :, :, n])
 
@@ -280,7 +280,7 @@ class DistanceSearch:
         return [i for i, name in enumerate(self.names) if name in names]
 
 
-def own_results(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
+def own_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by urdfkin's forward recursion."""
     return placements(*_flat_inputs(robot, q, frames))
 
@@ -291,7 +291,7 @@ def _flat_inputs(robot: Robot, q: FloatArray, frames: Sequence[str]) -> tuple[Co
     return robot.plan([tree.frame_link(frame) for frame in frames]), with_unit_quaternions(tree, q)
 
 
-def pinocchios(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
+def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by Pinocchio from the robot's text."""
     return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
 
@@ -333,30 +333,32 @@ def _second_derivatives(
 ) -> Iterator[tuple[int, int, float]]:
     """Yield i, j and a bound on the second derivative with respect to joints i and j, for all j <= i."""
     free = [_as_free_vectors(step) for step in steps]
-    d, y = at_the_frame(frame, COARSE)
+    d, y = start_at_frame(frame, COARSE)
     for i in reversed(range(len(steps))):
         first = _derivatives(steps[i], pairs[i], variables, d, y)
         if steps[i].kind == "turns":
             yield i, i, _pass_to_front(_cross_products(free[i], *first), free[: i + 1], pairs, variables)
-        vectors = before_it(free[i], *first)
+        vectors = after_constant_motion(free[i], *first)
         for j in reversed(range(i)):
             if steps[j].kind == "turns":
                 second = _derivatives(free[j], pairs[j], variables, *vectors)
                 yield i, j, _pass_to_front(second, free[: j + 1], pairs, variables)
-                vectors = passed(free[j], pairs[j], variables, *vectors)
+                vectors = after_joint(free[j], pairs[j], variables, *vectors)
             else:
-                vectors = before_it(free[j], *vectors)
-        d, y = passed(steps[i], pairs[i], variables, d, y)
+                vectors = after_constant_motion(free[j], *vectors)
+        d, y = after_joint(steps[i], pairs[i], variables, d, y)
 
 
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
 ) -> float:
     """Return the largest length that d has at the base; `vectors` contains d and y at the last joint."""
-    vectors = before_it(steps[-1], *vectors)
+    vectors = after_constant_motion(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
-        vectors = before_it(step, *vectors) if slides else passed(step, pair, variables, *vectors)
+        vectors = (
+            after_constant_motion(step, *vectors) if slides else after_joint(step, pair, variables, *vectors)
+        )
     return vectors[0].largest()
 
 
@@ -371,7 +373,7 @@ def _derivatives(
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
-    d, y = difference(step, pair, variables, y, d), y.turned(step.other, *variables.range(pair.b))
+    d, y = d_after_joint(step, pair, variables, y, d), y.rotate(step.other, *variables.range(pair.b))
     return _cross_products(step, d, y)
 
 
@@ -400,17 +402,17 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 
 
 #: Largest number of boxes that exist at a time; a box is a range for each variable.
-#: With `MOST` boxes, the bound of a frame takes one or two seconds of processor time.
-MOST = 2**17
+#: With `MOST_BOXES` boxes, the bound of a frame takes one or two seconds of processor time.
+MOST_BOXES = 2**17
 #: Number of boxes computed in one batch. The Jacobians of more boxes would take gigabytes of memory.
-TOGETHER = 2**16
+BATCH = 2**16
 
 
 class Boxes:
     """Upper bounds on the distance between a frame's origin in A and in B.
 
     A box is a range for each variable. Each bound is valid for all configurations in one box. `names` are the
-    names of the variables that change the distance (`moved_together` finds them).
+    names of the variables that change the distance (`relevant_joints` finds them).
     """
 
     def __init__(self, search: DistanceSearch, frame: FramePair, names: Sequence[str]) -> None:
@@ -422,7 +424,7 @@ class Boxes:
         # Poses of B are expressed in A's root frame.
         q = search.configurations(self.middle[np.newaxis])[1]
         base = trees[1].link_frames[search.found.base[1]]
-        self.seen = search.hold @ inverse(own_results(search.robots[1], q, [base])[0, 0])
+        self.seen = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
         #: (nv, variables) derivatives of each robot's joint values by the variables.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
@@ -466,8 +468,8 @@ class Boxes:
         return T[:, :3, 3] + lever, J[:, :3] + np.cross(J[:, 3:], lever[:, :, np.newaxis], axis=1)
 
 
-def tightened(
-    search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MOST
+def tighten(
+    search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MOST_BOXES
 ) -> float:
     """Return a proven upper bound (m) on a frame's distance, with at most `most` boxes at a time.
 
@@ -475,7 +477,7 @@ def tightened(
     bound of at most `upper`, which is proven already.
     """
     variables = search.variables
-    steps, pairs = moved_together(search.found, variables, frame)
+    steps, pairs = relevant_joints(search.found, variables, frame)
     some = [pair for pair in pairs if pair is not None]
     all_round = all(
         step.kind == "turns" and abs(line.slope) == 1.0
@@ -483,7 +485,7 @@ def tightened(
         for line in (pair.a, pair.b)
         if line.slope and math.inf in np.abs(variables.ranges[line.variable])
     )
-    if not target < upper < math.inf or len(some) < len(pairs) or not (all(search.stands) and all_round):
+    if not target < upper < math.inf or len(some) < len(pairs) or not (all(search.base_fixed) and all_round):
         return upper
     names, M = curvature(steps, some, variables, frame)
     boxes = Boxes(search, frame, names)
@@ -500,14 +502,14 @@ def tightened(
         c[::2, i] -= h[i]
         c[1::2, i] += h[i]
         if (rest := 0.5 * float(h @ M @ h)) < upper:
-            bounds = [boxes.bounds(c[k : k + TOGETHER], h) for k in range(0, len(c), TOGETHER)]
+            bounds = [boxes.bounds(c[k : k + BATCH], h) for k in range(0, len(c), BATCH)]
             proven = np.minimum(proven, np.concatenate(bounds) + rest)
             keep = proven > target
             c, proven = c[keep], proven[keep]
     return float(proven.max(initial=target))
 
 
-def moved_together(
+def relevant_joints(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
@@ -518,7 +520,7 @@ def moved_together(
     joint after the first difference.
     """
     steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
-    first = len(steps) - len(behind_first(found, variables, frame)[0])
+    first = len(steps) - len(from_first_difference(found, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
             first = i  # all joints from joint i to the first difference are included

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 
 import numpy as np
 
-from urdfkin.comparison.bounds import DistanceSearch, own_results, pinocchios, tightened
+from urdfkin.comparison.bounds import DistanceSearch, own_poses, pinocchio_poses, tighten
 from urdfkin.comparison.result import Confirmation, ConfirmationState, Difference, Sameness, Verdict
 from urdfkin.comparison.verdict import CONFIRMED, Comparator
 from urdfkin.errors import InputError, UnknownNameError
@@ -20,8 +20,8 @@ from urdfkin.model.mechanisms.mechanism import (
     Gauge,
     JointTransform,
     Variables,
-    apart,
     is_pose,
+    pose_difference,
     variables_of,
 )
 from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
@@ -287,7 +287,7 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
         return
     found = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
     variables = variables_of(found, comparator.tolerance)
-    said = comparator.said(found, variables)
+    said = comparator.result_without_bounds(found, variables)
     wrong = list(_statement_errors(document, comparator, said))
     yield from wrong
     claims = {(frame["frame"], frame["frame_b"]): frame for frame in document["frames"]}
@@ -302,7 +302,7 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
     yield from (f"frame {names[0]} is not a common frame of the models" for names in claims)
     if document["verdict"] == Verdict.DIFFERS.value and not wrong:
         other = comparator.alignment()
-        better = comparator.said(other, variables_of(other, comparator.tolerance)).verdict
+        better = comparator.result_without_bounds(other, variables_of(other, comparator.tolerance)).verdict
         if better is not Verdict.DIFFERS:
             yield f"`verdict`: another alignment of B with A gives {better.value}, not differs"
     if said.after:
@@ -405,9 +405,9 @@ def _not_a_gauge(document: SameCertificate, gauge: Gauge, comparator: Comparator
         if not made.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in gauge.orders:
-        if not b.may_be_taken(names, comparator.tolerance):
+        if not b.allows_order(names, comparator.tolerance):
             return f"`orders`: the axes do not allow the order {', '.join(names)}"
-        b = b.in_order(names)
+        b = b.reordered(names)
     return None
 
 
@@ -449,7 +449,7 @@ def _as_written_errors(
     frame = written.frames[names.index((claim["frame"], claim["frame_b"]))]
     search = comparator.search(written, variables, as_written=True)
     rounding = comparator.rounding(written, variables)
-    off = search.seen(written.frames)[0].max(axis=0)
+    off = search.sampled_distances(written.frames)[0].max(axis=0)
     if claim["upper"] is not None and off.max() > claim["upper"] + rounding[0]:
         yield f"`as_written`: frame {names[int(off.argmax())][0]} is {off.max():.6g} m off, which is farther"
     problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
@@ -492,12 +492,12 @@ def _interval_errors(
         if problems or not sharply:
             return
         # A claimed upper bound is wrong if the models reach a larger distance.
-        attained = max(claim["lower"], float(search.seen([frame])[0].max()))
+        attained = max(claim["lower"], float(search.sampled_distances([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
             return
         if not search.unbounded:
-            proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
+            proven = tighten(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
         if _within(proven[0], metres, rounding[0]):
             return
     yield f"{place}: its upper bound is not proven; {proven[0]:.6g} m and {proven[1]:.6g} rad are proven"
@@ -513,11 +513,11 @@ def _not_attained(
     """
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
-    if not search.belong_together(q_a, q_b):
+    if not search.correspond(q_a, q_b):
         yield f"{place}: the configurations of A and B do not correspond, or exceed the limits"
         return
-    for computed, by in ((own_results, "urdfkin"), (pinocchios, "Pinocchio")):
-        turned, off = apart(*(Ts[0, 0] for Ts in search.poses_at(q_a, q_b, [frame], computed)))
+    for computed, by in ((own_poses, "urdfkin"), (pinocchio_poses, "Pinocchio")):
+        turned, off = pose_difference(*(Ts[0, 0] for Ts in search.poses_at(q_a, q_b, [frame], computed)))
         if off < claim["lower"] - rounding[0]:
             yield f"{place}: {by} finds {off:.6g} m at its configuration, not {claim['lower']:.6g} m"
         if turned < claim["radians_seen"] - rounding[1]:

@@ -27,8 +27,8 @@ from urdfkin.model.mechanisms.mechanism import (
     Mechanism,
     Tolerance,
     Variables,
-    apart,
     limits,
+    pose_difference,
     tolerance_of,
 )
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock, Mimic
@@ -620,7 +620,9 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
         raise InputError(f"a joint of {which} occurs twice", where="map", found=repr(double))
 
 
-def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
+def changes_of_b(
+    found: Alignment, rounding: Tolerance, *, tables: bool = False
+) -> tuple[tuple[str, str], ...]:
     """Return the changes that make B equal to A: the kind of each (an entry of `FREE`) and a line of text.
 
     The function sets the tool poses in `found`. If one model is a Denavit-Hartenberg table (`tables`), every
@@ -652,10 +654,10 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
             words = f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}"
             lines += [("zeros", words)] if step.offset else []
             lines += [("senses", words)] if step.sense < 0 else []
-    return (*lines, *_tools_put_right(found, rounding, tables=tables))
+    return (*lines, *_tool_changes(found, rounding, tables=tables))
 
 
-def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
+def _tool_changes(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
     """Yield the kind "tools" and a line of text for each changed tool.
 
     A frame that differs is a tool if it has no children, or if it describes how the robot is mounted.
@@ -664,8 +666,8 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
     for k, frame in enumerate(found.frames):
         beside = (frame.a, frame.b) in around
         if frame.differs and (beside or tables or _is_tool(found, frame)):
-            found.frames[k] = frame.put_right()
-            if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
+            found.frames[k] = frame.as_tool()
+            if beside and rounding.holds(*pose_difference(found.a.homes[frame.a], found.b.homes[frame.b])):
                 continue  # the line about the base already reports this difference
         if (tool := found.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
@@ -691,7 +693,7 @@ def _around(found: Alignment) -> set[tuple[int, int]]:
         if (frame.a in before_a and frame.b in before_b)
         or (
             (frame.a in before_a | idle_a and frame.b in before_b | idle_b)
-            and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b]))
+            and rounding.holds(*pose_difference(found.a.homes[frame.a], found.b.homes[frame.b]))
         )
     }
 

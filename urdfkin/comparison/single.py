@@ -72,8 +72,8 @@ from urdfkin.model.mechanisms.mechanism import (
     MatchedJoints,
     Screw,
     Tolerance,
-    apart,
-    between,
+    pose_difference,
+    smallest_motion,
 )
 from urdfkin.model.tree import FloatArray, inverse
 
@@ -108,7 +108,7 @@ class JointComparison:
         """Yield each difference that is larger than rounding; the links come in A's order."""
         joints, links = self.found.a.tree.joints, self.found.a.tree.links
         starts = [m.homes[link] for m, link in zip(self.mechanisms, self.start, strict=True)]
-        if not all(self.tolerance.holds(*apart(np.eye(4), T)) for T in (self.base, *starts)):
+        if not all(self.tolerance.holds(*pose_difference(np.eye(4), T)) for T in (self.base, *starts)):
             yield JointDifference(f"link {links[self.start[0]]}", "base", None, "at another place")
         done = set[int]()
         for link, other in sorted(self.pairs.items()):
@@ -166,7 +166,7 @@ class JointComparison:
         screws, poses, bounds = zip(*(self._passed(k, *two) for k, two in enumerate(paths)), strict=True)
         if not paths[0][0] and len(paths[0][1]) == 1:
             name = f"joint {trees[0].joints[link - 1].name}"
-        off = list(self._beyond(name, "origin", *apart(*poses), bounds[0] + bounds[1]))
+        off = list(self._beyond(name, "origin", *pose_difference(*poses), bounds[0] + bounds[1]))
         yield from off
         for step in filter(None, steps):
             joint = f"joint {trees[0].joints[step.a].name}"
@@ -186,7 +186,7 @@ class JointComparison:
         The point of an axis may lie anywhere on this axis.
         """
         ends = (axis, other) if self.joints[0].any() else (other, axis)
-        return between(*ends, turns=step.kind == "turns")[1:]
+        return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 
     def _passed(
         self, which: int, back: Sequence[int], path: Sequence[int]
@@ -245,7 +245,7 @@ class JointComparison:
             [mechanism.homes[link] for (mechanism, _), link in zip(ends, parents, strict=True)],
             [mechanism.homes[path[0] + 1] for mechanism, path in ends],
         ):
-            if not self.tolerance.holds(*apart(T, self.base @ other)):
+            if not self.tolerance.holds(*pose_difference(T, self.base @ other)):
                 why = "follows a planar or floating joint with another frame"
                 yield JointDifference(name, "", None, why)
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urdfkin.comparison.bounds import MOST, DistanceSearch, pinocchios, tightened
+from urdfkin.comparison.bounds import MOST_BOXES, DistanceSearch, pinocchio_poses, tighten
 from urdfkin.comparison.result import (
     BOUNDED,
     FREE,
@@ -20,9 +20,9 @@ from urdfkin.comparison.result import (
     Sameness,
     Tool,
     Verdict,
+    changes_of_b,
     demand_joint_names,
     differences,
-    put_right,
     remarks,
 )
 from urdfkin.comparison.single import JointComparison
@@ -41,7 +41,7 @@ from urdfkin.model.mechanisms.mechanism import (
     Mechanism,
     Tolerance,
     Variables,
-    apart,
+    pose_difference,
     tolerance_of,
     variables_of,
 )
@@ -70,7 +70,7 @@ def same(
     *,
     map: Mapping[str, str] | None = None,
     bounds: bool = True,
-    boxes: int = MOST,
+    boxes: int = MOST_BOXES,
     within: float | None = None,
 ) -> Sameness:
     """Decide and prove whether two models move alike in every configuration.
@@ -117,7 +117,7 @@ def same(
     for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
         demand_joint_names(robot.tree, names, which)
     # The copies protect the user's robots: a comparison stores many compiled trees in its robots.
-    return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
+    return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).compare()
 
 
 def _parse_given_map(given: Mapping[str, str] | None) -> dict[str, str]:
@@ -148,7 +148,7 @@ class Comparator:
         robots: tuple[Robot, Robot],
         given: dict[str, str],
         bounds: bool,
-        boxes: int = MOST,
+        boxes: int = MOST_BOXES,
         within: float | None = None,
     ) -> None:
         self.robots, self.given, self.bounds, self.boxes = robots, given, bounds, boxes
@@ -179,12 +179,12 @@ class Comparator:
                 )
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
 
-    def judged(self) -> Sameness:
+    def compare(self) -> Sameness:
         """Return the complete result, with intervals and Pinocchio's confirmation."""
         found = self.alignment()
         self._check_map(found)
         variables = variables_of(found, self.tolerance)
-        said = self.said(found, variables)
+        said = self.result_without_bounds(found, variables)
         frames = self._intervals(found, variables)
         as_written, most = None, said.written
         if self.bounds:
@@ -203,12 +203,12 @@ class Comparator:
         """Search for the alignment of B with A for which most joints and links agree."""
         return align(*self.mechanisms, {**self.spelled, **self.given})
 
-    def said(self, found: Alignment, variables: Variables) -> Sameness:
+    def result_without_bounds(self, found: Alignment, variables: Variables) -> Sameness:
         """Return the result without intervals and confirmation; set the tool frames in `found`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
         tables = any(robot.origin.table for robot in self.robots)
-        after = put_right(found, self.tolerance, tables=tables)
+        after = changes_of_b(found, self.tolerance, tables=tables)
         free = {what for what, _ in after}
         wrong = differences(found, variables)
         single = self.single(found, variables)
@@ -356,7 +356,7 @@ class Comparator:
         uppers = self._uppers(found, variables)
         off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
         search = self.search(found, variables)
-        seen = dict(zip(off, search.worst([frames[k] for k in off]), strict=True)) if off else {}
+        seen = dict(zip(off, search.largest_distances([frames[k] for k in off]), strict=True)) if off else {}
         self._sharpen(uppers, frames, search, NEAR * max((way for way, _ in seen.values()), default=0.0))
         return tuple(
             self._interval(found, frame, search, seen.get(k), (uppers[k][0] + metres, uppers[k][1] + radians))
@@ -401,7 +401,7 @@ class Comparator:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
                 break
-            sharper = tightened(search, frames[widest], target, uppers[widest][0], self.boxes)
+            sharper = tighten(search, frames[widest], target, uppers[widest][0], self.boxes)
             uppers[widest] = sharper, uppers[widest][1]
             if sharper > target:
                 break
@@ -412,11 +412,11 @@ class Comparator:
             return None
         metres, radians = self.rounding(found, variables)
         search = self.search(found, variables, as_written=True)
-        off = search.seen(found.frames)[0].max(axis=0)
+        off = search.sampled_distances(found.frames)[0].max(axis=0)
         far = [found.frames[k] for k in np.argsort(-off, kind="stable")[:FARTHEST]]
         if off.max() <= metres:  # no position differs, so the frame with the largest angle counts
             far = [max(found.frames, key=lambda frame: upper_bounds(found, variables, frame)[1])]
-        climbed = zip(search.worst(far), far, strict=True)
+        climbed = zip(search.largest_distances(far), far, strict=True)
         seen, frame = max(climbed, key=lambda both: both[0][0])
         upper = (math.inf, math.inf) if search.unbounded else upper_bounds(found, variables, frame, FINE)
         return self._interval(found, frame, search, seen, (upper[0] + metres, upper[1] + radians))
@@ -435,9 +435,9 @@ class Comparator:
         metres, z = seen
         rounding = self.rounding(found, search.variables)
         if metres <= rounding[0] and upper[1] > rounding[1]:
-            z = search.most_turned(frame)
+            z = search.largest_rotation(frame)
         poses = search.poses(z[np.newaxis], [frame])
-        turned = apart(poses[0][0, 0], poses[1][0, 0])[0]
+        turned = pose_difference(poses[0][0, 0], poses[1][0, 0])[0]
         q_a, q_b = search.configurations(z[np.newaxis])
         lower = max(0.0, metres - rounding[0])
         return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
@@ -463,8 +463,10 @@ class Comparator:
     def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
         """Return each frame's largest distance (m) at `CONFIRMED` configurations, by Pinocchio."""
         search = self.search(found, variables)
-        q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
-        return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))
+        q_a, q_b = search.configurations(search.random_values(CONFIRMED), moved=True)
+        return np.asarray(
+            search.distances_at(q_a, q_b, found.frames, pinocchio_poses).max(axis=0, initial=0.0)
+        )
 
 
 def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -30,11 +30,11 @@ from urdfkin.model.mechanisms.mechanism import (
     Mechanism,
     Screw,
     Tolerance,
-    along,
     angle_from_to,
-    apart,
-    between,
     between_lines,
+    pose_difference,
+    screw_motion,
+    smallest_motion,
 )
 from urdfkin.model.tree import FloatArray, JointKind, inverse
 
@@ -173,9 +173,9 @@ class Pairing:
             if (f := by_name.get(self.given.get(name, name))) is not None:
                 yield e, f
         for e in ours:
-            links = {self.a.labels[k] for k in self.a.bodies[e.beyond(bodies[0])]}
+            links = {self.a.labels[k] for k in self.a.bodies[e.other_body(bodies[0])]}
             for f in theirs:
-                if links & {self.b.labels[k] for k in self.b.bodies[f.beyond(bodies[1])]}:
+                if links & {self.b.labels[k] for k in self.b.bodies[f.other_body(bodies[1])]}:
                     yield e, f
 
     def _geometries(
@@ -207,7 +207,7 @@ class Pairing:
         """Return a text that lists the kinds of the joints in the subtree after a joint."""
         key = mechanism is self.a, body, edge.joint
         if (known := self._signatures.get(key)) is None:
-            beyond = edge.beyond(body)
+            beyond = edge.other_body(body)
             below = sorted(
                 self._signature(mechanism, beyond, other)
                 for other in mechanism.edges_of[beyond]
@@ -298,7 +298,7 @@ class Axis:
         return float(u @ (start.point + foot * start.direction))
 
 
-def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
+def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
     """Yield values of a joint with the axis u: angles or distances that move the axis `theirs` to `ours`."""
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
@@ -317,20 +317,20 @@ def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
             yield guess
 
 
-def behind(
+def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], seen: Both[Screw]
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of joint axes, one at a body of A and one at a body of B.
 
-    If a joint's axis is parallel to the line `seen`, `behind` also yields the axes after this joint.
+    If a joint's axis is parallel to the line `seen`, `later_axes` also yields the axes after this joint.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
         if np.linalg.norm(np.cross(screws[0].direction, seen[0].direction)) < ALONG:
-            beyond = e.beyond(bodies[0]), f.beyond(bodies[1])
-            yield from behind(mechanisms, (e, f), beyond, screws if axes[0].turns else seen)
+            beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
+            yield from later_axes(mechanisms, (e, f), beyond, screws if axes[0].turns else seen)
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
@@ -340,17 +340,17 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     this rotation and this translation so that later axes coincide too. If no axes follow the first axis, it
     uses other axes of the same body, for example the rotor axes of a drone.
     """
-    firsts = _firsts((a, b), (None, None), bodies, ())
+    firsts = _first_axes((a, b), (None, None), bodies, ())
     for (ours, theirs), near, far in firsts:
         seen = far or [
             (replace(one, seen=ours.screw), replace(other, seen=theirs.screw)) for (one, other), *_ in firsts
         ]
         for start in (theirs.screw, theirs.screw.reversed()):
-            K = between(start, ours.screw, turns=True)[0]
+            K = smallest_motion(start, ours.screw, turns=True)[0]
             for turn in _guesses(ours.screw, [*near, *seen], K, turns=True):
-                X = along(ours.screw, turn, turns=True) @ K
+                X = screw_motion(ours.screw, turn, turns=True) @ K
                 for way in _guesses(ours.screw, seen, X, turns=False):
-                    yield along(ours.screw, way, turns=False) @ X
+                    yield screw_motion(ours.screw, way, turns=False) @ X
 
 
 def root_poses_by_siblings(
@@ -374,8 +374,8 @@ def root_poses_by_siblings(
     for f, axis in theirs[first]:
         lines = u, axis.screw
         pair_of = partial(_seen_from, lines)
-        beyond = edges[first].beyond(bodies[0]), f.beyond(bodies[1])
-        far = list(behind((a, b), (edges[first], f), beyond, lines))
+        beyond = edges[first].other_body(bodies[0]), f.other_body(bodies[1])
+        far = list(later_axes((a, b), (edges[first], f), beyond, lines))
         for start, (g, other) in product((axis.screw, axis.screw.reversed()), theirs[second]):
             if g is f:
                 continue
@@ -384,15 +384,15 @@ def root_poses_by_siblings(
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
             if not ours[second].turns:  # A prismatic joint has no `height`.
-                carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
+                carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
-            K = between(start, u, turns=True)[0]
-            for turn in zeros(u, pair[0], pair[1].moved(K), turns=True):
-                X = along(u, turn, turns=True) @ K
-                ways = list(zeros(u, pair[0], pair[1].moved(X), turns=False))
+            K = smallest_motion(start, u, turns=True)[0]
+            for turn in zero_candidates(u, pair[0], pair[1].moved(K), turns=True):
+                X = screw_motion(u, turn, turns=True) @ K
+                ways = list(zero_candidates(u, pair[0], pair[1].moved(X), turns=False))
                 for way in ways or _guesses(u, [*more, *far], X, turns=False):
-                    yield along(u, way, turns=False) @ X
+                    yield screw_motion(u, way, turns=False) @ X
 
 
 def _seen_from(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
@@ -404,10 +404,10 @@ def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
 
 
 def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
-    return [x for ours, theirs in pairs for x in zeros(u, ours, theirs.moved(X), turns)] or [0.0]
+    return [x for ours, theirs in pairs for x in zero_candidates(u, ours, theirs.moved(X), turns)] or [0.0]
 
 
-def _firsts(
+def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
     """Find the first revolute axes below two bodies; if there is none, the prismatic axes.
@@ -419,11 +419,11 @@ def _firsts(
     for e, f in _next_joints(mechanisms, via, bodies):
         pair, beyond = (
             (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
-            (e.beyond(bodies[0]), f.beyond(bodies[1])),
+            (e.other_body(bodies[0]), f.other_body(bodies[1])),
         )
         lines = pair[0].screw, pair[1].screw
-        deeper = [] if pair[0].turns else _firsts(mechanisms, (e, f), beyond, (*near, pair))
-        found += deeper or [(pair, near, list(behind(mechanisms, (e, f), beyond, lines)))]
+        deeper = [] if pair[0].turns else _first_axes(mechanisms, (e, f), beyond, (*near, pair))
+        found += deeper or [(pair, near, list(later_axes(mechanisms, (e, f), beyond, lines)))]
     return found
 
 
@@ -484,7 +484,7 @@ class Congruence:
         self._rules = False
         self._known.clear()
 
-    def at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
+    def joint_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
         """Return the joint pairs at two bodies if the subtrees after these bodies match exactly, else None.
 
         `via` contains the joints before these bodies; None at the first bodies. The motion X (4, 4) moves B's
@@ -493,10 +493,10 @@ class Congruence:
         found = None if self._off else self._at(bodies, via, X)
         return None if found is None else found[0]
 
-    def behind(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
+    def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
         """Return the pose (4, 4) of B's body after two joints if the subtrees match exactly, else None.
 
-        X is the pose of the parent body of B's joint, as in the method `at`.
+        X is the pose of the parent body of B's joint, as in `joint_pairs`.
         """
         found = None if self._off else self._behind(e, f, bodies, X)
         return None if found is None else found.X
@@ -505,7 +505,7 @@ class Congruence:
         if not self.pairing.same_shape(bodies, via):
             return None
         for i, j in self.pairing.links(*bodies):
-            if not self.tolerance.holds(*apart(self.a.homes[i], X @ self.b.homes[j])):
+            if not self.tolerance.holds(*pose_difference(self.a.homes[i], X @ self.b.homes[j])):
                 return None
         named, left_a, left_b = self.pairing.by_names(bodies, via)
         if len(left_a) != len(left_b) or not all(self._lie_alike(e, f, X) for e, f in named):
@@ -550,7 +550,7 @@ class Congruence:
         for other, match in known:
             if self._same_case(e, other, X):
                 return match
-        beyond = e.beyond(bodies[0]), f.beyond(bodies[1])
+        beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
         found, own = None, self._rate(e, f, bodies, X)
         if self.pairing.same_shape(beyond, (e, f)):
             for there in _distinct(self.poses(beyond, (e, f), X)):
@@ -599,7 +599,7 @@ class Congruence:
         """Return whether a motion of the joint leads from one of two poses of B's body to the other."""
         kind = self.a.joint(e).kind
         if kind.nq > 1:
-            return family(kind) == "floating" or self.tolerance.holds(*apart(X, other))
+            return family(kind) == "floating" or self.tolerance.holds(*pose_difference(X, other))
         screw, D = self.a.screw(e), other @ inverse(X)
         if kind.turns:
             moved = screw.moved(D)
@@ -608,7 +608,7 @@ class Congruence:
                 float(np.linalg.norm(moved.point - screw.point)),
             )
         across = D[:3, 3] - screw.direction * (screw.direction @ D[:3, 3])
-        return self.tolerance.holds(apart(IDENTITY, D)[0], float(np.linalg.norm(across)))
+        return self.tolerance.holds(pose_difference(IDENTITY, D)[0], float(np.linalg.norm(across)))
 
 
 def _distinct(poses: Iterable[FloatArray]) -> Iterator[FloatArray]:

@@ -25,11 +25,11 @@ from urdfkin.model.mechanisms.joint_matching import (
     Pair,
     Pairing,
     Via,
-    behind,
     family,
+    later_axes,
     root_poses_by_axes,
     root_poses_by_siblings,
-    zeros,
+    zero_candidates,
 )
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
@@ -42,15 +42,15 @@ from urdfkin.model.mechanisms.mechanism import (
     Mechanism,
     Screw,
     Tolerance,
-    along,
-    apart,
-    between,
+    angle_about,
     between_lines,
-    onto_plane,
+    nearest_planar_pose,
+    planar_counterpart,
+    pose_difference,
+    screw_motion,
     size_of,
+    smallest_motion,
     tolerance_of,
-    turn_about,
-    undoing,
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
@@ -70,14 +70,14 @@ Score = tuple[int, float]
 
 
 @dataclass(slots=True)
-class Ahead:
+class LookAhead:
     """The number of joint pairs ahead that several matchers together may still compare."""
 
     left: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class BodyPair:
     """A body of A, the corresponding body of B, and the poses that the matcher has found for them.
 
     Attributes:
@@ -115,7 +115,7 @@ class MechanismMatcher:
         b: Mechanism,
         pairing: Pairing,
         gauge: Gauge | None,
-        ahead: Ahead,
+        ahead: LookAhead,
         tolerance: Tolerance,
         base: tuple[int, int] | None,
     ) -> None:
@@ -156,7 +156,7 @@ class MechanismMatcher:
                 links = self.a.tree.link_index(names[0]), self.b.tree.link_index(names[1])
                 base = self.a.body_of[links[0]], self.b.body_of[links[1]]
             X = self.gauge.X
-            yield base, IDENTITY if self.tolerance.holds(*apart(IDENTITY, X)) else X
+            yield base, IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, X)) else X
             return
         bases = list(self._bases())
         if self.exact is not None:
@@ -171,7 +171,7 @@ class MechanismMatcher:
                 continue
             tried = list[FloatArray]()
             for X in self._places(base):
-                if not any(self.tolerance.holds(*apart(known, X)) for known in tried):
+                if not any(self.tolerance.holds(*pose_difference(known, X)) for known in tried):
                     tried.append(X)
                     yield base, X
 
@@ -251,9 +251,9 @@ class MechanismMatcher:
 
     def _by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         """Yield poses of B's root that align the first axes of A and B. The best alignment comes first."""
-        scored = list[tuple[float, Place, Score]]()
+        scored = list[tuple[float, BodyPair, Score]]()
         for X in root_poses_by_axes(self.a, self.b, base):
-            place = Place(base, (None, None), -1, IDENTITY, X)
+            place = BodyPair(base, (None, None), -1, IDENTITY, X)
             scored.append((0.0, place, self._score(place)))
         best = _best_of(scored)[2] if scored else (0, 0.0)
         yield from (place.XC for _, place, score in scored if not better(best, score))
@@ -263,7 +263,7 @@ class MechanismMatcher:
     def _run(self, base: tuple[int, int], X: FloatArray) -> Alignment:
         """Pair all joints and links, starting at two bodies; X is the pose of B's root in A's root frame."""
         found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
-        stack = [Place(base, (None, None), -1, IDENTITY, X)]
+        stack = [BodyPair(base, (None, None), -1, IDENTITY, X)]
         while stack:
             place = stack.pop()
             self._frames(place, found)
@@ -280,37 +280,37 @@ class MechanismMatcher:
                     found.matched += 1
         return found
 
-    def _edges(self, place: Place) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
+    def _edges(self, place: BodyPair) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         pairs = self._exact_pairs(place.bodies, place.via, inverse(place.G) @ place.XC)
         if pairs is not None:
             return pairs, (), ()
         return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
 
     def _exact_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        return None if self.exact is None else self.exact.at(bodies, via, X)
+        return None if self.exact is None else self.exact.joint_pairs(bodies, via, X)
 
     def _poses_behind(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
         """Yield poses of the body of B after a joint, for the pose X of the body before it."""
-        there = Place(beyond, via, -1, IDENTITY, X)
+        there = BodyPair(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
             t, turns = self.b.screw(f), kind == "turns"
             for offset in self._offsets(there, IDENTITY, t, turns):
-                yield X @ along(t, offset, turns=turns) if offset else X
+                yield X @ screw_motion(t, offset, turns=turns) if offset else X
             return
         homes = self.a.homes[via[0].joint + 1], self.b.homes[f.joint + 1]
-        plane = undoing(inverse(X @ homes[1]) @ homes[0]) if kind == "planar" else None
+        plane = planar_counterpart(inverse(X @ homes[1]) @ homes[0]) if kind == "planar" else None
         for N in self._behind(there, homes[0], homes[1], plane, self._exact_places(beyond)):
             yield homes[0] @ N @ inverse(homes[1])
 
-    def _frames(self, place: Place, found: Alignment) -> None:
+    def _frames(self, place: BodyPair, found: Alignment) -> None:
         pairs = self._all_links(place)
         if (other := self._as_tools(place, pairs)) is not None:
             found.frames.append(other)
         for link_a, link_b in pairs:
             home = self.a.homes[link_a]
             at, seen = place.G @ home, place.XC @ self.b.homes[link_b]
-            angle, way = apart(at, seen)
+            angle, way = pose_difference(at, seen)
             end = IDENTITY
             if self.tolerance.holds(angle, way):
                 angle = way = 0.0
@@ -320,7 +320,7 @@ class MechanismMatcher:
                 found.worst = max(found.worst, angle * self.size + way)
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
 
-    def _as_tools(self, place: Place, taken: list[tuple[int, int]]) -> FramePair | None:
+    def _as_tools(self, place: BodyPair, taken: list[tuple[int, int]]) -> FramePair | None:
         """Return two links, one of each body, that can be different end-effector frames; or None.
 
         The result is None if links of the two bodies match, or if a body has no link of its own.
@@ -332,7 +332,7 @@ class MechanismMatcher:
         tool = inverse(place.G @ home) @ place.XC @ self.b.homes[theirs[0]]
         return FramePair(ours[0], theirs[0], place.previous, home, IDENTITY, 0.0, 0.0, tool)
 
-    def _all_links(self, place: Place) -> list[tuple[int, int]]:
+    def _all_links(self, place: BodyPair) -> list[tuple[int, int]]:
         """Return pairs of links with equal names, then pairs of links with equal poses.
 
         A link is paired by its pose only if its name does not exist in the other model.
@@ -343,27 +343,27 @@ class MechanismMatcher:
         for i in ours:
             at = place.G @ self.a.homes[i]
             for j in theirs:
-                if j not in taken and self.tolerance.holds(*apart(at, place.XC @ self.b.homes[j])):
+                if j not in taken and self.tolerance.holds(*pose_difference(at, place.XC @ self.b.homes[j])):
                     pairs.append((i, j))
                     taken.add(j)
                     break
         return pairs
 
-    def _own_links(self, place: Place) -> tuple[list[int], list[int]]:
+    def _own_links(self, place: BodyPair) -> tuple[list[int], list[int]]:
         """Return the links of two matched bodies whose names do not occur in the other model."""
         names_a, names_b = self.a.labels, self.b.labels
         ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
 
     def _step(
-        self, place: Place, e: Edge, f: Edge, index: int, depth: int
-    ) -> tuple[MatchedJoints, Place, Score]:
-        """Match two joints. Return their step, the bodies after them (`Place`), and the score."""
+        self, place: BodyPair, e: Edge, f: Edge, index: int, depth: int
+    ) -> tuple[MatchedJoints, BodyPair, Score]:
+        """Match two joints. Return their step, the bodies after them (`BodyPair`), and the score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
-        bodies = e.beyond(place.bodies[0]), f.beyond(place.bodies[1])
-        there = Place(bodies, via, index, place.G, place.XC)
+        bodies = e.other_body(place.bodies[0]), f.other_body(place.bodies[1])
+        there = BodyPair(bodies, via, index, place.G, place.XC)
         if kinds[0] != kinds[1]:
             return self._unlike(place, via, kinds, backwards), there, (0, 0.0)
         if kinds[0] in ("turns", "prismatic"):
@@ -371,7 +371,7 @@ class MechanismMatcher:
         return self._free(place, there, backwards, depth, kinds[0])
 
     def _unlike(
-        self, place: Place, via: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
+        self, place: BodyPair, via: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
     ) -> MatchedJoints:
         """Return the step for two joints of different kinds. One of the joints may be fixed."""
         unlike = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
@@ -385,8 +385,8 @@ class MechanismMatcher:
         )
 
     def _free(
-        self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, kind: str
-    ) -> tuple[MatchedJoints, Place, Score]:
+        self, place: BodyPair, there: BodyPair, backwards: tuple[bool, bool], depth: int, kind: str
+    ) -> tuple[MatchedJoints, BodyPair, Score]:
         """Match two planar or two floating joints, whose frames and zeros may differ."""
         e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
@@ -396,7 +396,7 @@ class MechanismMatcher:
         given = None if self.gauge is None else self.gauge.conversions.get(self.a.joint(e).name)
         as_written = self.gauge is not None and given is None
         if as_written:
-            K, tilt, shift = seen @ inverse(at), *apart(at, seen)
+            K, tilt, shift = seen @ inverse(at), *pose_difference(at, seen)
         else:
             K, tilt, shift = _normals_apart(at, seen) if kind == "planar" else (IDENTITY, 0.0, 0.0)
         if not self.tolerance.holds(tilt, shift):
@@ -411,21 +411,23 @@ class MechanismMatcher:
         elif exact is not None:
             tried = [inverse(at) @ exact @ homes[1]]
         else:
-            plane = undoing(M) if kind == "planar" else None
+            plane = planar_counterpart(M) if kind == "planar" else None
             tried = self._behind(there, at, homes[1], plane, self._by_axes(there.bodies))
         places = ((N, replace(there, XC=at @ N @ inverse(homes[1]))) for N in tried)
         N, moved, score = self._best(places, depth)
         # Let P_a and P_b be the joint's poses in A and B, so P_b = M P_a N.
         # If the path leads from the joint's child to its parent, P_a and P_b are the inverse poses.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
-        before, behind = (IDENTITY if self.tolerance.holds(*apart(IDENTITY, T)) else T for T in pair)
+        before, behind = (
+            IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, T)) else T for T in pair
+        )
         if before is IDENTITY and behind is IDENTITY and not back:
             return step, there, score
         return replace(step, conversion=JointTransform(before, behind, back)), moved, score
 
     def _behind(
         self,
-        there: Place,
+        there: BodyPair,
         at: FloatArray,
         home_b: FloatArray,
         plane: FloatArray | None,
@@ -451,11 +453,11 @@ class MechanismMatcher:
         ]
         for XC in chain(wanted, (there.G @ X for X in poses_behind)):
             N = inverse(at) @ XC @ home_b
-            yield N if plane is None else plane @ onto_plane(inverse(plane) @ N)
+            yield N if plane is None else plane @ nearest_planar_pose(inverse(plane) @ N)
 
     def _like(
-        self, place: Place, there: Place, backwards: tuple[bool, bool], depth: int, *, turns: bool
-    ) -> tuple[MatchedJoints, Place, Score]:
+        self, place: BodyPair, there: BodyPair, backwards: tuple[bool, bool], depth: int, *, turns: bool
+    ) -> tuple[MatchedJoints, BodyPair, Score]:
         """Match two revolute joints or two prismatic joints.
 
         The method chooses the sign and the zero offset of B's joint, and decides whether the two axes differ.
@@ -468,15 +470,15 @@ class MechanismMatcher:
         sense = sense or (-1 if start.direction @ end.direction < 0.0 else 1)
         if sense < 0:
             end = end.reversed()
-        K, tilt, shift = between(start, end, turns=turns)
+        K, tilt, shift = smallest_motion(start, end, turns=turns)
         back = inverse(place.G)
         kind, (a, b) = "turns" if turns else "prismatic", (e.joint, f.joint)
         if self.tolerance.holds(tilt, shift):
             exact = self._exact_pose(place, there)
             if exact is not None:
                 T = inverse(place.XC) @ exact
-                zero = turn_about(t.direction, T[:3, :3]) if turns else float(t.direction @ T[:3, 3])
-                zero = 0.0 if self.tolerance.holds(*apart(place.XC, exact)) else zero
+                zero = angle_about(t.direction, T[:3, :3]) if turns else float(t.direction @ T[:3, 3])
+                zero = 0.0 if self.tolerance.holds(*pose_difference(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return (
                 MatchedJoints(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0),
@@ -498,11 +500,11 @@ class MechanismMatcher:
             a, b, kind, place.previous, sense, with_it[0], before, s, s, tilt, shift
         ), *with_it[1:]
 
-    def _exact_pose(self, place: Place, there: Place) -> FloatArray | None:
+    def _exact_pose(self, place: BodyPair, there: BodyPair) -> FloatArray | None:
         """Return `XC` of the bodies after two joints if the subtrees below them match exactly, else None."""
         if self.exact is None:
             return None
-        X = self.exact.behind(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
+        X = self.exact.pose_after(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
         return None if X is None else place.G @ X
 
     # -- a joint's zero ------------------------------------------------------------------------------
@@ -512,25 +514,26 @@ class MechanismMatcher:
         return (0, None) if self.gauge is None else self.gauge.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
-        self, there: Place, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
-    ) -> tuple[float, Place, Score]:
+        self, there: BodyPair, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
+    ) -> tuple[float, BodyPair, Score]:
         """Return the zero offset of B's joint for which most links and axes agree; 0 is tried first."""
         offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
         moved = (
-            (offset, there.XC @ along(t, offset, turns=turns) if offset else there.XC) for offset in offsets
+            (offset, there.XC @ screw_motion(t, offset, turns=turns) if offset else there.XC)
+            for offset in offsets
         )
         return self._best(((offset, replace(there, G=G, XC=XC)) for offset, XC in moved), depth)
 
-    def _best(self, choices: Iterable[tuple[_Free, Place]], depth: int) -> tuple[_Free, Place, Score]:
+    def _best(self, choices: Iterable[tuple[_Free, BodyPair]], depth: int) -> tuple[_Free, BodyPair, Score]:
         """Return the choice for which most links and axes agree.
 
         If several choices are equally good, the method compares the next `depth` joints too. Example: two
         axes of B intersect at right angles, and so do two axes of A. Two different poses of B make these axes
         coincide, so a third axis must decide.
         """
-        scored = list[tuple[_Free, Place, Score]]()
+        scored = list[tuple[_Free, BodyPair, Score]]()
         for what, place in choices:
-            if any(self.tolerance.holds(*apart(known.XC, place.XC)) for _, known, _ in scored):
+            if any(self.tolerance.holds(*pose_difference(known.XC, place.XC)) for _, known, _ in scored):
                 continue
             score = self._score(place)
             scored.append((what, place, score))
@@ -540,24 +543,24 @@ class MechanismMatcher:
         equal = [one for one in scored if not better(best[2], one[2])]
         if not depth or self.ahead.left <= 0 or (len(equal) == 1 and depth == AHEAD):
             return best
-        seen = list[tuple[_Free, Place, Score]]()
+        seen = list[tuple[_Free, BodyPair, Score]]()
         for what, place, here in equal:
             seen.append((what, place, self._with_behind(place, here, depth)))
             if not seen[-1][2][1]:
                 break
         return _best_of(seen)
 
-    def _with_behind(self, place: Place, here: Score, depth: int) -> Score:
+    def _with_behind(self, place: BodyPair, here: Score, depth: int) -> Score:
         """Return the score for the bodies of `place` and for the next `depth` joints after them."""
         pairs = self.pairing.edges(place.bodies, place.via, place.G, place.XC)[0]
         self.ahead.left -= len(pairs)
         scores = [here, *(self._step(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
         return sum(count for count, _ in scores), max(off for _, off in scores)
 
-    def _score(self, place: Place) -> Score:
+    def _score(self, place: BodyPair) -> Score:
         """Return the number of matching links and axes of two bodies, and the largest difference (m)."""
         off = [
-            apart(place.G @ self.a.homes[i], place.XC @ self.b.homes[j])
+            pose_difference(place.G @ self.a.homes[i], place.XC @ self.b.homes[j])
             for i, j in self.pairing.links(*place.bodies)
         ]
         pairs, _, _ = self.pairing.edges(place.bodies, place.via, place.G, place.XC)
@@ -565,18 +568,18 @@ class MechanismMatcher:
         wrong = [angle * self.size + way for angle, way in off if not self.tolerance.holds(angle, way)]
         return len(off) - len(wrong), max(wrong, default=0.0)
 
-    def _offsets(self, there: Place, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
+    def _offsets(self, there: BodyPair, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
         """Yield zero offsets of B's joint: 0, then those for which links or axes after the joint coincide."""
         yield 0.0
         u = t.moved(there.XC)
         for i, j in self.pairing.links(*there.bodies):
             at, seen = G @ self.a.homes[i], there.XC @ self.b.homes[j]
             if turns:
-                yield turn_about(u.direction, at[:3, :3] @ seen[:3, :3].T)
+                yield angle_about(u.direction, at[:3, :3] @ seen[:3, :3].T)
             else:
                 yield float(u.direction @ (at[:3, 3] - seen[:3, 3]))
-        for ours, theirs in behind((self.a, self.b), there.via, there.bodies, (u.moved(inverse(G)), t)):
-            yield from zeros(u, ours.moved(G), theirs.moved(there.XC), turns)
+        for ours, theirs in later_axes((self.a, self.b), there.via, there.bodies, (u.moved(inverse(G)), t)):
+            yield from zero_candidates(u, ours.moved(G), theirs.moved(there.XC), turns)
 
 
 def _counts(mechanism: Mechanism) -> list[tuple[int, int]]:
@@ -598,7 +601,7 @@ def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
 
 
-def _best_of(scored: Sequence[tuple[_Free, Place, Score]]) -> tuple[_Free, Place, Score]:
+def _best_of(scored: Sequence[tuple[_Free, BodyPair, Score]]) -> tuple[_Free, BodyPair, Score]:
     best = scored[0]
     for one in scored[1:]:
         best = one if better(one[2], best[2]) else best
@@ -632,7 +635,7 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
     while stack:
         here, edge = stack.pop()
         found.append(edge.joint)
-        beyond = edge.beyond(here)
+        beyond = edge.other_body(here)
         stack += [(beyond, other) for other in mechanism.edges_of[beyond] if other is not edge]
     return found
 
@@ -640,7 +643,9 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
 def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
     """Return the angle (rad) and the distance (m) between two planes; opposite normals count as equal."""
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
-    return between(start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False)
+    return smallest_motion(
+        start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False
+    )
 
 
 #: At most this number of joint orders is tried; five prismatic joints have 120 possible orders.
@@ -664,16 +669,16 @@ def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | N
     """
     if gauge is not None:
         for taken in gauge.orders:
-            b = b.in_order(taken)
+            b = b.reordered(taken)
         return _best_alignment(a, b, given, gauge)
-    best = _best_alignment(a, b, given, None, Ahead(MOST_AHEAD))
+    best = _best_alignment(a, b, given, None, LookAhead(MOST_AHEAD))
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.complete:
             break
         as_it_is, run = best.b, next(orders)
         for names in _orders_to_try(a, as_it_is, given, run, orders):
             moved = [k for k, name in enumerate(names) if name != run[k]]
-            other = as_it_is.in_order(names[moved[0] : moved[-1] + 1])
+            other = as_it_is.reordered(names[moved[0] : moved[-1] + 1])
             found = _best_alignment(a, other, given, None)
             if better((found.matched, found.worst), (best.matched, best.worst)):
                 best = found
@@ -695,7 +700,7 @@ def _orders_to_try(
     named = sorted(run, key=called.__getitem__)
     if list(run) in (named, named[::-1]):
         return
-    yield from (order for order in (named, named[::-1]) if b.may_be_taken(order, tolerance_of(a, b)))
+    yield from (order for order in (named, named[::-1]) if b.allows_order(order, tolerance_of(a, b)))
 
 
 def _by_rules(best: Alignment) -> Alignment:
@@ -715,7 +720,7 @@ def _exchanged(best: Alignment, given: Mapping[str, str]) -> Alignment:
     """
     if best.only_a or best.only_b:  # Some joints have no partner, so no exchange can make A and B equal.
         return best
-    tried, ahead = set[frozenset[tuple[int, int]]](), Ahead(MOST_AHEAD)
+    tried, ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_AHEAD)
     while (two := next((two for two in best.exchangeable(given) if two not in tried), None)) is not None:
         tried.add(two)
         if len(tried) > MOST_EXCHANGED:
@@ -738,19 +743,19 @@ def _nearly(best: Alignment, given: Mapping[str, str]) -> Alignment:
     but with the normal tolerance, so that the result contains the small differences. The function tries only
     tolerances between the smallest difference and half of the largest difference.
     """
-    a, b, (least, most), ahead = best.a, best.b, best.inner_off, Ahead(MOST_AHEAD)
+    a, b, (least, most), ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_AHEAD)
     for angle in NEARLY:
         if not least < angle * best.size < TWICE_AS_WELL * most:
             continue
         tolerance = Tolerance(angle, angle * best.size)
         rough = _best_alignment(a, b, given, None, ahead, tolerance, best.base)
-        if rough.inner_off[1] or (len(rough.only_a), len(rough.only_b)) != (
+        if rough.inner_differences[1] or (len(rough.only_a), len(rough.only_b)) != (
             len(best.only_a),
             len(best.only_b),
         ):
             continue
         exact = _best_alignment(a, b, rough.names, rough.gauge)
-        return exact if exact.inner_off[1] < TWICE_AS_WELL * most else best
+        return exact if exact.inner_differences[1] < TWICE_AS_WELL * most else best
     return best
 
 
@@ -759,14 +764,14 @@ def _best_alignment(
     b: Mechanism,
     given: Mapping[str, str],
     gauge: Gauge | None,
-    ahead: Ahead | None = None,
+    ahead: LookAhead | None = None,
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
     """Return the best alignment over all first bodies; if `base` is given, only its bodies are tried."""
     tolerance = tolerance or tolerance_of(a, b)
     pairing = Pairing(a, b, given, tolerance)
-    return MechanismMatcher(a, b, pairing, gauge, ahead or Ahead(0), tolerance, base).best()
+    return MechanismMatcher(a, b, pairing, gauge, ahead or LookAhead(0), tolerance, base).best()
 
 
 #: These full turns are added to the zero offset of a revolute joint with a mimic rule.

@@ -65,7 +65,7 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inve
 ALONG = 1e-12
 
 
-def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
+def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
     """Return exp(S t) (4, 4): a rotation about a screw in radians, or a translation along it in metres."""
     if not turns:
         return pose(p=screw.direction * value)
@@ -73,7 +73,7 @@ def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
     return pose(R, screw.point - R @ screw.point)
 
 
-def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
+def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
     The motion first rotates the axis about the first joint's origin to the direction of the second axis. Then
@@ -100,7 +100,7 @@ def shortest_turn(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
     return exp_rotation(cross * (angle / sine)), angle
 
 
-def apart(T: FloatArray, other: FloatArray) -> tuple[float, float]:
+def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between two poses."""
     R = (other[:3, :3] @ T[:3, :3].T).tolist()  # Thousands of calls are faster with plain floats.
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
@@ -108,7 +108,7 @@ def apart(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
 
 
-def turn_about(u: FloatArray, R: FloatArray) -> float:
+def angle_about(u: FloatArray, R: FloatArray) -> float:
     """Return the angle (rad) for which a rotation about u is nearest to the rotation R."""
     vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return math.atan2(float(u @ vector), float(np.trace(R) - u @ R @ u))
@@ -173,7 +173,7 @@ def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
 def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
     """Return the coordinates of a pose (..., 4, 4) of a planar or floating joint."""
     if kind is JointKind.PLANAR:
-        return np.concatenate((P[..., :2, 3], turn_in_plane(P)[..., np.newaxis]), axis=-1)
+        return np.concatenate((P[..., :2, 3], planar_angle(P)[..., np.newaxis]), axis=-1)
     if kind is not JointKind.FLOATING:
         raise NotImplementedError(f"the coordinates of a {kind} joint")
     return np.concatenate((P[..., :3, 3], quaternion_of(P[..., :3, :3])), axis=-1)
@@ -184,20 +184,20 @@ def is_pose(kind: JointKind, T: FloatArray) -> bool:
     near = NEARLY * (1.0 + np.abs(T).max())
     if not is_rigid(T, near):
         return False
-    return kind is JointKind.FLOATING or bool(np.abs(onto_plane(T) - T).max() <= near)
+    return kind is JointKind.FLOATING or bool(np.abs(nearest_planar_pose(T) - T).max() <= near)
 
 
-def turn_in_plane(P: FloatArray) -> FloatArray:
+def planar_angle(P: FloatArray) -> FloatArray:
     """Return the angle of the rotation about z that is nearest to a pose's rotation."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
-def onto_plane(P: FloatArray) -> FloatArray:
+def nearest_planar_pose(P: FloatArray) -> FloatArray:
     """Return the planar pose (4, 4) that is nearest to a pose."""
     return pose_of(JointKind.PLANAR, coordinates_of(JointKind.PLANAR, P))
 
 
-def undoing(M: FloatArray) -> FloatArray:
+def planar_counterpart(M: FloatArray) -> FloatArray:
     """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
 
     M must keep the direction of the plane's normal or reverse it. Then M consists of a translation along the
@@ -230,7 +230,7 @@ class Edge:
     inner: int
     outer: int
 
-    def beyond(self, body: int) -> int:
+    def other_body(self, body: int) -> int:
         return self.outer if body == self.inner else self.inner
 
 
@@ -265,7 +265,7 @@ class Mechanism:
                 bodies[body[-1]].append(i + 1)
         self.homes, self.body_of, self.edges = homes, body, edges
         self.bodies = bodies
-        #: Each entry lists consecutive joints that `in_order` put in another order, in this new order.
+        #: Each entry lists consecutive joints that `reordered` put in another order, in this new order.
         self.orders: tuple[tuple[str, ...], ...] = ()
         #: Each link has the length (m) of the path from the root and the number of joints on it.
         self.lengths, self.depths = lengths, depths
@@ -281,7 +281,7 @@ class Mechanism:
             known = self._screws[edge.joint] = Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
         return known
 
-    def in_order(self, names: Sequence[str]) -> Mechanism:
+    def reordered(self, names: Sequence[str]) -> Mechanism:
         """Return a mechanism with consecutive joints in another order, from the inner body outwards.
 
         The motion stays the same. The result does not contain the links between these joints.
@@ -299,7 +299,7 @@ class Mechanism:
         other.orders = (*self.orders, tuple(names))
         return other
 
-    def may_be_taken(self, names: Sequence[str], tolerance: Tolerance) -> bool:
+    def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
         """Return whether the named joints are consecutive, and the given order results in the same motion."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -484,7 +484,7 @@ class FramePair:
     shift: float
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
-    def put_right(self) -> FramePair:
+    def as_tool(self) -> FramePair:
         """Return the same pair without a difference; B's link is then another end-effector frame, `tool`."""
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
@@ -541,7 +541,7 @@ class Alignment:
         return size_of(self.a, self.b)
 
     @property
-    def inner_off(self) -> tuple[float, float]:
+    def inner_differences(self) -> tuple[float, float]:
         """Smallest and largest difference (m) of matched axes, and of matched links that have child joints.
 
         Differences of 0 do not count.
@@ -597,7 +597,7 @@ class Alignment:
             # A matched pair of links on these bodies gives the transform from B's body to A's.
             T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
             home, at = self.a.homes[a], T_a_b @ self.b.homes[b]
-            tilt, shift = apart(home, at)
+            tilt, shift = pose_difference(home, at)
             if rounding.holds(tilt, shift):
                 found.append(FramePair(a, b, known.previous, home, IDENTITY, 0.0, 0.0))
             else:
@@ -723,10 +723,10 @@ class Variables:
 
 def variables_of(found: Alignment, tolerance: Tolerance) -> Variables:
     """Return the joint values of all steps of an alignment, and the ranges of their variables."""
-    return _MechanismBuilder(found, tolerance).make()
+    return _VariablesBuilder(found, tolerance).make()
 
 
-class _MechanismBuilder:
+class _VariablesBuilder:
     def __init__(self, found: Alignment, tolerance: Tolerance) -> None:
         self.found, self.tolerance = found, tolerance
         self.trees = found.a.tree, found.b.tree

@@ -46,7 +46,7 @@ from urdfkin.model.mechanisms.mechanism import (
     MatchedValues,
     Screw,
     Variables,
-    apart,
+    pose_difference,
 )
 from urdfkin.model.tree import FloatArray
 
@@ -127,15 +127,15 @@ class Support:
         found[np.isnan(found)] = np.inf  # Zero times infinity is NaN; the bound is then infinite.
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
-    def turned(self, screw: Screw, low: float, high: float) -> Support:
+    def rotate(self, screw: Screw, low: float, high: float) -> Support:
         """Rotate the set about a screw by all angles of a range. Return the support function of the union."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
-        best = centred.turned_back(screw.direction, angles, factors).max(axis=0)
+        best = centred.rotated_values(screw.direction, angles, factors).max(axis=0)
         return Support(self.grid, best + G @ screw.point)
 
-    def turned_back(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
+    def rotated_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return the support function's values (angles, n) at the n grid points after rotations of the set.
 
         The set rotates about `axis` by each of `angles` (rad). Since h'(u) is h(R^T u), the method rotates
@@ -148,14 +148,14 @@ class Support:
         across = (G - along) @ back * np.reshape(factors, (-1, 1, 1))
         return self.at(along + across)
 
-    def slid(self, direction: FloatArray, low: float, high: float) -> Support:
+    def translate(self, direction: FloatArray, low: float, high: float) -> Support:
         """Translate the set by all distances (m) of a range. Return the support function of the union."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             ways = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
         return Support(self.grid, self.values + ways)
 
-    def moved(self, T: FloatArray) -> Support:
+    def transform(self, T: FloatArray) -> Support:
         """Return the support function of the set after a rigid motion T."""
         return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
@@ -221,19 +221,19 @@ def upper_bounds(
     They are inf if the difference grows without bound with the value of an unlimited joint, or if two matched
     joints are of different kinds.
     """
-    steps, pairs = behind_first(found, variables, frame)
+    steps, pairs = from_first_difference(found, variables, frame)
     if not steps and frame.end is IDENTITY:
         return 0.0, 0.0
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
-    radians = _radians(steps, pairs, variables, frame)
+    radians = _angle_bound(steps, pairs, variables, frame)
     if not steps:  # No joint differs, so the distance is the same in every configuration.
         d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
         return float(np.linalg.norm(d)), radians
-    return _metres(steps, pairs, variables, frame, grid), radians
+    return _distance_bound(steps, pairs, variables, frame, grid), radians
 
 
-def behind_first(
+def from_first_difference(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the steps and joint values on the path to a frame, starting with the first step that differs."""
@@ -247,7 +247,7 @@ def _differs(step: MatchedJoints, pair: MatchedValues | None) -> bool:
     return step.differs or bool(step.unlike) or (pair is not None and pair.a != pair.b)
 
 
-def _radians(
+def _angle_bound(
     steps: Sequence[MatchedJoints],
     pairs: Sequence[MatchedValues | None],
     variables: Variables,
@@ -258,9 +258,9 @@ def _radians(
     The bound is a sum: each joint or constant motion that differs contributes the largest angle that it
     causes.
     """
-    total = apart(IDENTITY, frame.end)[0]
+    total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
-        total += apart(IDENTITY, step.before)[0]
+        total += pose_difference(IDENTITY, step.before)[0]
         if step.kind != "turns" or pair is None:
             continue
         if step.other is not step.axis:
@@ -273,41 +273,41 @@ def _radians(
     return min(total, math.pi)
 
 
-def _metres(
+def _distance_bound(
     steps: Sequence[MatchedJoints],
     pairs: Sequence[MatchedValues | None],
     variables: Variables,
     frame: FramePair,
     grid: Grid,
 ) -> float:
-    d, y = at_the_frame(frame, grid)
-    ways = _off(frame.end, y.largest())
+    d, y = start_at_frame(frame, grid)
+    ways = _displacement_bound(frame.end, y.largest())
     for step, pair in zip(reversed(steps), reversed(pairs), strict=True):
-        d, y = passed(step, pair, variables, d, y)
+        d, y = after_joint(step, pair, variables, d, y)
         moves_alike = step.other is step.axis and pair is not None and pair.a == pair.b
-        ways += _off(step.before, y.largest()) if moves_alike else math.inf
+        ways += _displacement_bound(step.before, y.largest()) if moves_alike else math.inf
     return min(d.largest(), ways)
 
 
-def _off(L: FloatArray, reach: float) -> float:
+def _displacement_bound(L: FloatArray, reach: float) -> float:
     """Return a bound (m) on the distance |(R - 1) y + p| by which L moves a point y, |y| <= `reach`."""
     turned, moved = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
-    return moved + _times(turned, reach)
+    return moved + _product(turned, reach)
 
 
-def _times(factor: float, reach: float) -> float:
+def _product(factor: float, reach: float) -> float:
     """Return factor * reach, which is 0 if the factor is 0 and the reach is infinite."""
     return factor * reach if factor else 0.0
 
 
-def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
+def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
     """Return d and y at the frame, with which the recursion of the module docstring begins."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
 
 
-def passed(
+def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return d and y of the recursion (module docstring) after one more joint."""
@@ -317,21 +317,21 @@ def passed(
         d = Support(d.grid, d.largest() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
     else:
-        d = difference(step, pair, variables, y, d)
+        d = d_after_joint(step, pair, variables, y, d)
         ends = variables.range(pair.b)
-        y = y.turned(step.other, *ends) if step.kind == "turns" else y.slid(step.other.direction, *ends)
-    return before_it(step, d, y)
+        y = y.rotate(step.other, *ends) if step.kind == "turns" else y.translate(step.other.direction, *ends)
+    return after_constant_motion(step, d, y)
 
 
-def before_it(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
+def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
     """Return d and y of the recursion (module docstring) after the constant rigid motion L of a step."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
-    return Support(d.grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.moved(L)
+    return Support(d.grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.transform(L)
 
 
-def difference(
+def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
     """Return d of the recursion (module docstring) after one more joint, but before its motion L."""
@@ -339,11 +339,11 @@ def difference(
     if step.kind == "turns":
         about = Screw(step.axis.direction, np.zeros(3))
         if same:
-            return d.turned(about, *variables.range(pair.a)) if d.values.any() else d
+            return d.rotate(about, *variables.range(pair.a)) if d.values.any() else d
         z = _values(pair, variables, d.grid)
         if z is not None:
             return _common_difference(step, pair, z, y, d)
-        return d.turned(about, *variables.range(pair.a)) + _independent_difference(step, pair, variables, y)
+        return d.rotate(about, *variables.range(pair.a)) + _independent_difference(step, pair, variables, y)
     return d if same else d + _prismatic_difference(step, pair, variables, y.grid)
 
 
@@ -389,7 +389,7 @@ def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray
 def _common_difference(
     step: MatchedJoints, pair: MatchedValues, z: FloatArray, y: Support, d: Support
 ) -> Support:
-    """Return the result of `difference` for two revolute joints that the same variable moves.
+    """Return the result of `d_after_joint` for two revolute joints that the same variable moves.
 
     `z` contains sample values of the variable; let h be the distance between two neighbouring samples.
     Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
@@ -413,15 +413,15 @@ def _common_difference(
         reach = Support(y.grid, y.values - G @ other.point).largest() if tilt else 0.0
         off = float(np.linalg.norm(np.cross(other.point - axis.point, axis.direction)))
         late = abs(pair.b.constant - pair.a.constant)
-        bend = _times(2.0 * tilt + min(late, 2.0), widest) + tilt * reach + off
+        bend = _product(2.0 * tilt + min(late, 2.0), widest) + tilt * reach + off
         bend *= pair.a.slope**2
     else:
-        bend = _times(pair.a.slope**2, y.radius(axis)) + _times(pair.b.slope**2, widest)
+        bend = _product(pair.a.slope**2, y.radius(axis)) + _product(pair.b.slope**2, widest)
     between = np.maximum(apart_[:-1], apart_[1:]) + bend * (z[1] - z[0]) ** 2 / 8.0 * y.grid.lengths
     if d.values.any():
         half = abs(pair.a.slope) * (z[1] - z[0]) / 2.0
-        ends = d.turned_back(axis.direction, t, 1.0)
-        middles = d.turned_back(axis.direction, (t[:-1] + t[1:]) / 2.0, 1.0 / math.cos(half))
+        ends = d.rotated_values(axis.direction, t, 1.0)
+        middles = d.rotated_values(axis.direction, (t[:-1] + t[1:]) / 2.0, 1.0 / math.cos(half))
         between += np.maximum(np.maximum(ends[:-1], ends[1:]), middles)
     return Support(y.grid, between.max(axis=0))
 
@@ -437,9 +437,9 @@ def _independent_difference(
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:
-        there = y.turned(step.other, *variables.range(pair.b))
-        back = Support(y.grid, y.values).turned(step.axis, *variables.range(pair.a))
+        there = y.rotate(step.other, *variables.range(pair.b))
+        back = Support(y.grid, y.values).rotate(step.axis, *variables.range(pair.a))
         return Support(y.grid, there.values + back.at(-G))
-    chord = _times(2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0), y.radius(step.axis))
+    chord = _product(2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0), y.radius(step.axis))
     across = np.linalg.norm(G - (G @ u)[:, None] * u, axis=1)
-    return Support(y.grid, np.array([_times(length, chord) for length in across]))
+    return Support(y.grid, np.array([_product(length, chord) for length in across]))
