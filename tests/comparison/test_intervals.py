@@ -18,13 +18,13 @@ from tests.comparison.searching import far, searched
 from tests.reading import present
 from tests.urdfs import joint, limit, loaded, mimic
 from tests.urdfs import robot as urdf
-from urdfkin.comparison.bounds import Boxes, DistanceSearch, curvature, relevant_joints, tighten
+from urdfkin.comparison.bounds import Boxes, DistanceSearch, tighten
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, FramePair, Gauge, Screw, screw_motion, variables_of
-from urdfkin.model.mechanisms.upper_bound import FINE, Grid, point, upper_bounds
+from urdfkin.model.mechanisms.upper_bound import FINE, Grid, curvature, point, relevant_joints, upper_bounds
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.same import where
 from urdfkin.robot import Robot
