@@ -52,13 +52,13 @@ def _tried(
     monkeypatch: pytest.MonkeyPatch, a: Robot, b: Robot
 ) -> list[tuple[MechanismMatcher, tuple[int, int], Alignment]]:
     """Compare two robots, and return each pair of bodies from which they were aligned."""
-    tried, run = list[tuple[MechanismMatcher, tuple[int, int], Alignment]](), MechanismMatcher._run
+    tried, run = list[tuple[MechanismMatcher, tuple[int, int], Alignment]](), MechanismMatcher._match_from
 
     def noted(self: MechanismMatcher, base: tuple[int, int], X: FloatArray) -> Alignment:
         tried.append((self, base, found := run(self, base, X)))
         return found
 
-    monkeypatch.setattr(MechanismMatcher, "_run", noted)
+    monkeypatch.setattr(MechanismMatcher, "_match_from", noted)
     urdfkin.same(a, b, bounds=False)
     return tried
 
@@ -70,7 +70,7 @@ def test_no_more_joints_and_links_agree_than_the_bodies_at_the_start_allow(
 ) -> None:
     tried = _tried(monkeypatch, robot(name), other(name, what))
     assert tried
-    assert all(found.matched <= self._most(base) for self, base, found in tried)
+    assert all(found.matched <= self._most_matches(base) for self, base, found in tried)
 
 
 def test_bodies_from_which_less_can_agree_than_agrees_already_are_not_tried(

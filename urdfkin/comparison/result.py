@@ -452,7 +452,7 @@ class Sameness(Displayable):
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
-        >>> found.holds(Question(within=1.0))
+        >>> found.holds(SameQuestion(within=1.0))
         True
         """
         if not (bool(self) if question.within is None else self.within(question.within)):
@@ -832,7 +832,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
     elif step.differs:
         detail = "alone" if step.other is not step.axis else ""
         some.append(Difference(place, "axis", None, None, *_beyond_rounding(step, tolerance), detail))
-    if i in (*variables.freer_a, *variables.freer_b, *variables.rules):
+    if i in variables.rules:
         some.append(Difference(place, "mimic rule", joint.mimic, other.mimic))
     return some
 
