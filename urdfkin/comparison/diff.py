@@ -275,7 +275,7 @@ def _renamed(result: Sameness) -> KinematicTree:
 
 def _changes(old: str, new: str) -> Iterator[ModelChange]:
     roots = plain_xml(old), plain_xml(new)
-    names = [root.get("name") for root in roots]
+    names = roots[0].get("name"), roots[1].get("name")
     if names[0] != names[1]:
         yield ModelChange("robot", "name", *names)
     for tag in ("joint", "link"):
