@@ -292,18 +292,6 @@ def of_rows_read_back(rows: int) -> float:
     return 4.0 * of_rows(rows)
 
 
-def of_two_texts(joints: int) -> float:
-    """Return the allowed error (in eps) between the poses of a link in two URDF texts of the same robot.
-
-    The link comes after `joints` joints.
-
-    The parser and the writer round each joint's constant transform and its axis. If a program merges fixed
-    joints before it writes them, it rounds only the product of their constant transforms. The number of
-    roundings is then smaller.
-    """
-    return (CONSTANT + WRITTEN + AXES) * (joints + 1)
-
-
 def of_a_fit(rows: int) -> float:
     """Return the number of roundings in a comparison of a URDF with a table that was fitted to it.
 

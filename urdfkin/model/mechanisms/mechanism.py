@@ -54,7 +54,7 @@ from urdfkin.kinematics.rotation import (
     rotation_about,
     rotation_of,
 )
-from urdfkin.kinematics.roundings import EPS, of_two_texts
+from urdfkin.kinematics.roundings import AXES, CONSTANT, EPS, WRITTEN
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
@@ -370,9 +370,11 @@ class Mechanism:
     def rounding(self) -> float:
         """Rounding error of poses that are read from a file (rad, and as a fraction of `size`).
 
-        The error includes the small tilts of Pinocchio's axes (URDF514).
+        The parser and the writer of the file round each joint's constant transform and axis. The error
+        includes the small tilts of Pinocchio's axes (URDF514).
         """
-        return EPS * of_two_texts(max(self.depths)) + 2.0 * sum(joint.tilt for joint in self.tree.joints)
+        joints = max(self.depths) + 1
+        return EPS * ((CONSTANT + WRITTEN + AXES) * joints) + 2.0 * sum(j.tilt for j in self.tree.joints)
 
 
 @dataclass(frozen=True, slots=True)
