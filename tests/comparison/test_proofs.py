@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.comparison.pairs import written
 from tests.urdfs import joint, limit, loaded, mimic
 from tests.urdfs import robot as urdf
 from urdfkin.comparison.bounds import tighten
@@ -287,7 +287,7 @@ FORGED: dict[str, tuple[str, Callable[[Any], None], str]] = {
 def test_a_recheck_rejects_a_certificate_with(forged: str, request: pytest.FixtureRequest) -> None:
     pair, forge, words = FORGED[forged]
     a, b, found = request.getfixturevalue(pair)
-    document = json.loads(json.dumps(certificate(found)))
+    document = written(found)
     assert recheck(document, a, b) == []
     forge(document)
     assert any(words in line for line in recheck(document, a, b))
