@@ -32,7 +32,7 @@ from xml.etree import ElementTree
 
 import urdfkin
 from scripts.pages import table
-from urdfkin.comparison.bounds import MOST
+from urdfkin.comparison.bounds import MOST_BOXES
 from urdfkin.comparison.result import Sameness, Verdict, angle, length
 from urdfkin.urdf.catalogue import catalogue
 
@@ -131,7 +131,7 @@ def _compared(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sa
         files = converted(tool, pythons, _without_shapes(robot.urdf, Path(folder)), Path(folder))
         try:
             source = _loaded(files[0]) if TOOLS[tool].reads else robot
-            return urdfkin.same(source, _loaded(files[1]), boxes=0 if len(pythons) > 1 else MOST)
+            return urdfkin.same(source, _loaded(files[1]), boxes=0 if len(pythons) > 1 else MOST_BOXES)
         except urdfkin.UrdfkinError as error:
             raise RefusalError(f"not compared: {error.what}") from None
 

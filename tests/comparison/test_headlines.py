@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from importlib.metadata import version
@@ -13,10 +12,10 @@ import pytest
 import urdfkin
 from tests import urdfs
 from tests.cli.running import urdfkin as run
+from tests.comparison.pairs import certified
 from tests.comparison.test_pairs import FOLLOWING
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic
-from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import SameQuestion, Verdict
 from urdfkin.robot import Robot
 
@@ -106,8 +105,7 @@ def test_a_joint_of_another_kind_is_searched() -> None:
     assert math.isinf(worst.upper)
     assert headline(a, b).startswith("DIFFERS by 1.005 m or more and 1 rad or more (no bound is proven)")
     assert not found.within(10.0)
-    robots = urdfkin.load(a), urdfkin.load(b)
-    assert recheck(json.loads(json.dumps(certificate(found))), *robots) == []
+    assert certified(found, urdfkin.load(a), urdfkin.load(b))
 
 
 @pytest.mark.parametrize("below", ["", '<link name="table"/>'])
@@ -123,8 +121,7 @@ def test_a_robot_that_is_mounted_elsewhere_is_equivalent_up_to_the_base(below: s
     assert "without changes of B, base is 1.118 m off" in headline(a, b)
     assert found.exit_code() == 0
     assert found.exit_code(within=1.0) == 1
-    robots = urdfkin.load(a), urdfkin.load(b)
-    assert recheck(json.loads(json.dumps(certificate(found))), *robots) == []
+    assert certified(found, urdfkin.load(a), urdfkin.load(b))
 
 
 def test_a_frame_between_two_joints_of_the_base_is_no_mount() -> None:

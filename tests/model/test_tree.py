@@ -15,7 +15,7 @@ from tests.random_chains import rotation, shift
 from tests.random_chains import z_joint as joint
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.configuration import from_pinocchio, limit_violations, to_pinocchio
-from urdfkin.model.mechanisms.mechanism import apart
+from urdfkin.model.mechanisms.mechanism import pose_difference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree, with_root_joint
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
@@ -112,11 +112,11 @@ def test_poses_are_apart_by_the_angle_and_the_way_that_one_was_moved(axis: str, 
     T = shift(0.1, -0.2, 0.3) @ rotation("y", 0.7) @ rotation("x", -1.1)
     moved = T @ rotation(axis, angle)
     moved[:3, 3] += [2.0, 3.0, 6.0]
-    turned, way = apart(T, moved)
+    turned, way = pose_difference(T, moved)
     assert turned == pytest.approx(abs(angle), rel=1e-6, abs=1e-15)
     assert way == pytest.approx(7.0, rel=1e-15)
-    assert apart(moved, T) == pytest.approx((turned, way), rel=1e-12)
-    assert np.allclose(apart(T, T), 0.0, atol=1e-15)
+    assert pose_difference(moved, T) == pytest.approx((turned, way), rel=1e-12)
+    assert np.allclose(pose_difference(T, T), 0.0, atol=1e-15)
 
 
 # -- `integrate` and `difference`: Pinocchio's, and each undoes the other ------------------------------------

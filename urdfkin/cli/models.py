@@ -105,7 +105,7 @@ def same_command(
     --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are
     compared as written. Exit 0: all frames stay within the given distance. 1: a frame does not.
     """
-    from urdfkin.comparison.bounds import MOST
+    from urdfkin.comparison.bounds import MOST_BOXES
     from urdfkin.comparison.certificate import certificate
     from urdfkin.comparison.result import SameQuestion
     from urdfkin.comparison.verdict import parse_map, same
@@ -117,13 +117,13 @@ def same_command(
     check_writable(*paths.values())
     if more:
         reject_unused_options(click.get_current_context(), _OF_TWO, "with more than two robots")
-        return _all_pairs((a, b, *more), SameQuestion(within, strict), MOST if boxes is None else boxes)
+        return _all_pairs((a, b, *more), SameQuestion(within, strict), MOST_BOXES if boxes is None else boxes)
     first, second = load_several(a, b)
     robots = first, second
     with compiling():
         if recheck is not None:
             return _recheck(robots, recheck)
-        how_many = MOST if boxes is None else boxes
+        how_many = MOST_BOXES if boxes is None else boxes
         found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
     question = SameQuestion(within, strict)
     words = [word for pair in pairs for word in ("--map", pair)]

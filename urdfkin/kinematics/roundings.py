@@ -280,17 +280,6 @@ def of_rows_read_back(rows: int) -> float:
     return 4.0 * of_rows(rows)
 
 
-def of_two_texts(joints: int) -> float:
-    """Return the allowed error (in eps) between a link's poses in two URDF texts of the same robot.
-
-    The argument is the number of joints before the link.
-
-    The parser and the writer round each joint's constant transform and each axis. A program that merges fixed
-    joints before it writes them has fewer roundings: it rounds only the product of their transforms.
-    """
-    return (CONSTANT + WRITTEN + AXES) * (joints + 1)
-
-
 def of_a_fit(rows: int) -> float:
     """Return the number of roundings in a comparison of a URDF with a table that was fitted to it.
 
