@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 from tests.cli.running import good, refused, urdfkin
-from urdfkin.cli.output import Answer, check_writable, write_file
+from urdfkin.cli.output import Answer, check_writable
 from urdfkin.dh import read_table
 from urdfkin.errors import SourceError
 from urdfkin.errors.display import CodeLine, Matrix, Strong, Table, TextDocument
+from urdfkin.system.files import write_file
 
 #: A command line -> a word of its table, as text and in LaTeX.
 TABLES = {
@@ -83,8 +84,8 @@ def test_the_check_is_part_of_json_or_is_printed_beside_the_data() -> None:
 
 def test_an_entry_for_a_printed_format_replaces_the_document() -> None:
     answer = Answer(lambda: TextDocument("title"), {"html": lambda: "page"}, "checked")
-    assert answer.write("html") == ("page", False)
-    assert answer.write("table") == ("title\nchecked\n", True)
+    assert answer.convert("html") == ("page", False)
+    assert answer.convert("table") == ("title\nchecked\n", True)
 
 
 def test_a_document_has_matrices_code_and_emphasis_in_every_format() -> None:
