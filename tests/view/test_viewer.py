@@ -108,7 +108,7 @@ def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
         assert numbers == mujoco.to(q).tolist()
         assert viewer.words_of_q.label == "q of mujoco, to copy or type"
         viewer.words_of_q.value = written(mujoco.to(other := robot.sample(1, 6)[0]))
-        viewer._typed(SimpleNamespace(client=object()))
+        viewer._read_q(SimpleNamespace(client=object()))
         np.testing.assert_array_equal(viewer.q, other)
 
 
