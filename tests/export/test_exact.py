@@ -28,7 +28,7 @@ from tests.laws.subjects import robot_of
 from tests.reading import present
 from urdfkin.export import exact as exact_module
 from urdfkin.export import recursion, write
-from urdfkin.export.c import framed
+from urdfkin.export.c import fill_template
 from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, balls, literal
 from urdfkin.export.expression import Graph, Node, needed
 from urdfkin.export.proof import decimal
@@ -267,7 +267,7 @@ def test_the_sines_of_c_are_right_to_one_eps(real: str, fusing: str, tmp_path: P
     head += "#define SELDOM static\n#define R(x) ((real)(x))\n#define LANES 8\n"
     entrance = "void of(long n, const real *x, real *s, real *c) {\n"
     entrance += "    for (; n > 0; n -= 16, x += 16, s += 16, c += 16) sines_cosines(x, s, c, 2);\n}\n"
-    source.write_text(head + framed("sines.c") + entrance, encoding="utf-8")
+    source.write_text(head + fill_template("sines.c") + entrance, encoding="utf-8")
     flags = ["-std=c99", "-O2", "-march=native", f"-ffp-contract={fusing}", "-fPIC", "-shared"]
     subprocess.run(["cc", *flags, str(source), "-o", str(library), "-lm"], check=True)
     kind, far = (np.float64, 823_549.0) if real == "double" else (np.float32, 8192.0)
