@@ -20,7 +20,7 @@ from flint import arb
 import urdfkin
 from tests import urdfs
 from tests.cli.running import urdfkin as command
-from tests.export.writing import ALL, built, code, file, need, ran
+from tests.export.writing import ALL, built, code, file, module, need, ran
 from tests.high_precision import mp, true_motion
 from tests.laws.subjects import robot_of, state
 from tests.reading import module_of
