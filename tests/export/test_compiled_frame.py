@@ -1,4 +1,4 @@
-"""One frame compiled for its robot: Robot's results within the bound, its errors, its account."""
+"""A compiled frame has the results of `Robot` within the bound, its errors, and its record of checks."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def test_arrays_that_need_no_conversion_give_the_bits_and_the_errors_of_all_othe
         fast.acceleration(q, v, a, out=out, threads=0)
 
 
-def test_so_is_every_number_of_rows_that_no_register_divides() -> None:
+def test_a_number_that_is_not_finite_is_refused_in_rows_that_no_register_divides() -> None:
     free = urdfkin.load("panda", mimic=False)
     fast, inputs = free.compiled(free.tip_frame), np.zeros((3, 20, 9))
     fast.acceleration(*inputs)
