@@ -1,4 +1,4 @@
-"""Nothing that a URDF calls a link, a joint or itself becomes code in any language that is exported."""
+"""No name in a URDF becomes code in an exported file of any language."""
 
 import ast
 import re
@@ -53,7 +53,7 @@ def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> Non
 
 
 def code_alone(text: str, to: str) -> str:
-    """Without comments."""
+    """Return code without its comments."""
     if to in ("c", "cpp", "cuda"):
         return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     if to == "matlab":

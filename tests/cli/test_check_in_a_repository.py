@@ -1,4 +1,4 @@
-"""`urdfkin check` where maintainers live: folders, settings, what is known, what changed, what is mended."""
+"""`urdfkin check` in a repository: folders, settings, baselines, changes since a version, fixes."""
 
 import json
 import os
@@ -27,7 +27,7 @@ BAD = '<robot name="r"><link name="a"/><link name="b"/></robot>\n'
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty repository, and the current folder."""
+    """Make an empty repository the current folder."""
     (tmp_path / ".git").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -45,7 +45,7 @@ def check(*words: str) -> Done:
 
 
 def found(*words: str) -> list[tuple[str, str]]:
-    """(file, code) of each finding."""
+    """Return (file, code) of each finding."""
     return [(f["file"], f["code"]) for f in check("--format", "json", *words).data["findings"]]
 
 
@@ -87,7 +87,7 @@ def test_a_folder_or_pattern_without_a_urdf_is_an_error_not_a_success(here: Path
     assert (done.code, done.err.startswith(f"urdfkin: error: {word}: no URDF found")) == (2, True)
 
 
-# -- what is told --------------------------------------------------------------------------------------
+# -- output --------------------------------------------------------------------------------------------
 
 
 def test_carets_stand_below_what_is_meant_and_of_a_long_line_the_part_around_is_shown(here: Path) -> None:
@@ -194,7 +194,7 @@ def test_a_wrong_setting_is_told_with_its_place(here: Path, text: str) -> None:
     assert check("--isolated").code == 0
 
 
-# -- what is known -------------------------------------------------------------------------------------
+# -- baselines -----------------------------------------------------------------------------------------
 
 
 def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) -> None:
@@ -254,7 +254,7 @@ def test_what_is_no_baseline_is_refused(here: Path, text: str) -> None:
     assert Path("known.json").read_text() == text
 
 
-# -- what changed --------------------------------------------------------------------------------------
+# -- changes since a version ---------------------------------------------------------------------------
 
 
 def git(*words: str) -> None:
@@ -270,7 +270,7 @@ def commit() -> None:
 
 @pytest.fixture
 def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A branch `main` with two robots, and a branch `work` that has parted from it."""
+    """Make a repository with two robots on the branch `main`, and a new branch `work`."""
     monkeypatch.chdir(tmp_path)
     git("init", "-q", "-b", "main")
     put("arm.urdf")
@@ -290,7 +290,7 @@ def test_only_what_is_new_since_a_branch_is_told(repository: Path) -> None:
     assert found("--changed-since", "main") == new
     commit()
     assert found("--changed-since", "main") == new
-    # What main does meanwhile is not ours.
+    # A later commit on main changes nothing.
     git("checkout", "-q", "main")
     put("arm.urdf", GOOD)
     git("commit", "-qam", "mended on main")
@@ -338,7 +338,7 @@ MJCF = """<mujoco><worldbody><body name="a"><joint name="j"/><geom size="1"/><in
 SITE = '<mujocoinclude><site name="tip"/></mujocoinclude>'
 
 
-#: A file, its text, its part, the part's text before and after, and the findings.
+#: File, text, included file, text of the included file before and after the change, and findings
 IN_PARTS = {
     "usd": ("arm.usda", STAGE, "parts.usda", PARTS, PARTS + "\n", ["USD301", "USD302"]),
     "mjcf": ("arm.xml", MJCF, "part.xml", SITE, SITE + "\n", ["MJCF101", "MJCF102"]),
@@ -415,7 +415,7 @@ def test_git_runs_nothing_that_a_strangers_repository_names(repository: Path) ->
     assert not mark.exists()
 
 
-# -- what is mended ------------------------------------------------------------------------------------
+# -- fixes ---------------------------------------------------------------------------------------------
 
 
 def test_fix_mends_files_and_what_is_left_is_told(here: Path) -> None:

@@ -1,4 +1,4 @@
-"""`--convention NAME` and `urdfkin order`: the numbers of other tools, and the code that converts them."""
+"""`--convention NAME` reads and writes the numbers of other tools; `urdfkin order` prints code for this."""
 
 import itertools
 from pathlib import Path
@@ -109,7 +109,6 @@ def test_a_file_without_a_joint_or_with_two_columns_of_one_name_is_one_error(
 
 
 def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
-    """Nothing can cost time that does not run: no module is loaded, in a process of its own."""
     done = python(
         "import sys\nfrom tests.cli.running import urdfkin\n"
         "done = urdfkin('velocity a1 --q random:100 --v random --format csv')\n"

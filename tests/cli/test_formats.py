@@ -1,4 +1,4 @@
-"""Every table has every format, a file's suffix selects it, and a file is written whole or not at all."""
+"""Every table has every format, the suffix selects the format, and files are written completely or not."""
 
 import csv
 import errno
@@ -20,7 +20,7 @@ from urdfkin.errors import SourceError
 from urdfkin.errors.display import CodeLine, Matrix, Strong, Table, TextDocument
 from urdfkin.system.files import write_file
 
-#: A command line -> a word of its table, as text and in LaTeX.
+#: For each command line, a word of its table in text and in LaTeX
 TABLES = {
     "robots --family arm": "panda", "info elbow": "wrist", "jacobian elbow": "vx",
     "placement elbow": "x of frame", "hessian elbow": "changed by",
@@ -161,7 +161,7 @@ def test_a_file_that_could_not_be_read_was_not_checked(style: str, tmp_path: Pat
         assert done.text == "no findings in 1 file\n"
 
 
-# -- written whole ---------------------------------------------------------------------------------
+# -- files are written completely or not at all ------------------------------------------------------
 
 
 def test_a_file_that_is_written_is_alone_in_its_folder_with_the_rights_it_had(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""`urdfkin imu` and `urdfkin singular-values`: the library's numbers in every form."""
+"""`urdfkin imu` and `urdfkin singular-values` print the library's numbers in every format."""
 
 import csv
 import io

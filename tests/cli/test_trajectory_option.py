@@ -1,4 +1,4 @@
-"""`--trajectory FILE`: each row is the command at that configuration, in any units and names of the file."""
+"""`--trajectory FILE`: each row gives the result of the command in that configuration."""
 
 import csv
 import io
@@ -177,7 +177,6 @@ def test_singular_values_do_not_depend_on_the_convention_and_the_gradient_follow
 
 
 def test_a_placement_needs_no_time_and_keeps_the_angles_of_the_file(tmp_path: Path) -> None:
-    """Differences need three samples and unwrapped angles; a placement does not."""
     path = tmp_path / "log.csv"
     path.write_text("wheel\n3.1\n")
     (tmp_path / "w.urdf").write_text(robot_of(joint("wheel", "continuous", "a", "b"), name="w"))
@@ -233,7 +232,7 @@ def test_a_value_beside_a_trajectory_is_refused(option: str, log: Path) -> None:
     assert "does nothing along a --trajectory" in refused("placement panda --trajectory", str(log), option)
 
 
-#: What is written in place of a text of the file, and what is said.
+#: Pattern in the file, its replacement, and the message
 SPOILT = {
     "header": (r"^.*\n", "", "log.csv:1: no header: the first line must name the columns"),
     "missing": ("panda_joint3,", "x3,", "missing: panda_joint3"),

@@ -1,4 +1,4 @@
-"""Values in and numbers out: every way of giving q, v and a, every format, to the last digit."""
+"""Commands read q, v and a in every form, and print results to the last digit in every format."""
 
 import csv
 import io
@@ -28,7 +28,7 @@ Q = (0.1, -0.5, 1 / 3, -2.0, 2**-0.5, 1.5, 0.8, 0.02)
 
 
 def expected(quantity: str, n: int, reference: str) -> FloatArray:
-    """What the library computes for samples 0 to n-1 of seed 7, drawn as the command draws them."""
+    """Return the library's results for the samples that the command draws with seed 7."""
     robot, rng = library.load("panda"), np.random.default_rng(7)
     q = sample(robot.tree, n, rng)
     inputs = [q, *(rng.standard_normal((n, robot.nv)) for _ in QUANTITIES[quantity][1:])]
@@ -52,8 +52,7 @@ def test_json_csv_and_npy_give_the_librarys_numbers_to_the_last_digit(quantity: 
     assert np.array_equal(np.load(io.BytesIO(command(quantity, n, "local", "npy"))), result)
     rows = list(csv.reader(io.StringIO(command(quantity, n, "local", "csv").decode())))
     numbers = np.array([[float(cell) for cell in row if _is_number(cell)] for row in rows[1:]])
-    labels = 1  # the sample's number; a Jacobian's rows have a name besides, which is no number
-    assert np.array_equal(numbers[:, labels:].reshape(result.shape), result)
+    assert np.array_equal(numbers[:, 1:].reshape(result.shape), result)  # the first number is the sample's
 
 
 def _is_number(cell: str) -> bool:
@@ -84,7 +83,7 @@ def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
     monkeypatch.setenv("COLUMNS", str(columns))
     line += " talos --frame gripper_left_base_link --q random:1"
     *lines, _ = urdfkin(line).text.splitlines()  # the last one is the certificate
-    assert max(map(len, lines[2:])) <= columns  # text above the table is the terminal's to wrap
+    assert max(map(len, lines[2:])) <= columns  # the terminal wraps the text above the table
     path = [name for name in library.load("talos").rate_names if name.startswith(("torso", "arm_left"))]
     assert len(path) == 9
     assert set(path) <= {line.split()[0] for line in lines if line.split()}
@@ -108,7 +107,7 @@ def test_info_folds_no_name_and_puts_each_joints_numbers_in_its_line_or_the_next
         if not one.kind.nv:
             continue
         (at,) = [k for k, line in enumerate(lines[2:], 2) if one.name in line.lstrip("│├└ ").split()[:3]]
-        # Only names that are longer than the terminal run over its edge.
+        # Only names longer than the terminal's width continue on the next line.
         found = " ".join(lines[at : at + (1 if one.kind.value in lines[at].split() else 2)]).split()
         assert {robot.link_names[i + 1], one.kind.value, f"q[{robot.tree.q_index[i]}]"} <= set(found)
         if one.limit is not None and np.isfinite(one.limit.upper):
@@ -131,7 +130,7 @@ def test_the_catalogue_folds_no_name_and_is_no_wider_than_the_terminal(
     monkeypatch.setenv("COLUMNS", str(columns))
     lines = urdfkin("robots").text.splitlines()
     table = lines[: next(k for k, line in enumerate(lines) if line.endswith(" robots"))]
-    assert max(map(len, table)) <= max(columns, 71)  # family, base and tip alone take so much
+    assert max(map(len, table)) <= max(columns, 71)  # the width of family, base and tip
     words = {word for line in table for word in line.split()}
     for entry in catalogue().values():
         assert {entry.name, *entry.family.split(), *filter(None, (entry.base, entry.tip))} <= words
@@ -270,7 +269,7 @@ def test_a_table_is_a_robot_to_every_command_and_without_verification_exit_3_say
     assert done.data["result"] == [robot.jacobian(q, robot.tip_frame).tolist()]
 
 
-#: Longer than any terminal's line together with what belongs to it.
+#: Name that is longer than a terminal's line together with other text
 LONG = "a_joint_of_the_left_manipulator_whose_name_is_as_long_as_names_of_people_who_use_prefixes_are"
 
 

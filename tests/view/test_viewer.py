@@ -1,4 +1,4 @@
-"""The viewer listens to this machine alone, follows its controls, and says what to install without viser."""
+"""The viewer's sliders, text field and overlays show the checked motion of the robot."""
 
 import re
 import signal
@@ -56,7 +56,7 @@ def viewer() -> Iterator[Viewer]:
 
 @pytest.fixture(scope="module")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A browser for all tests that draw nothing."""
+    """Open a browser for the tests that need no pictures."""
     with opened(tmp_path_factory.mktemp("profile"), width=900, height=700, draws=False) as browser:
         yield browser
 
@@ -267,7 +267,7 @@ def test_a_browser_draws_it_without_errors_and_asks_nothing_elsewhere(viewer: Vi
         assert browser.js(_UNNAMED) == []
 
 
-#: Controls in sight that a screen reader cannot name.
+#: Visible controls without a name for a screen reader
 _UNNAMED = """return [...document.querySelectorAll("[role=slider], [role=button], input, button")]
   .filter((e) => e.offsetParent !== null && !e.ariaLabel && !e.textContent.trim())
   .map((e) => e.outerHTML.slice(0, 300))"""
@@ -296,7 +296,7 @@ def test_the_page_follows_the_theme_of_the_browser_and_its_words_and_focus_stand
     assert kinds >= {"INPUT", "BUTTON"}
 
 
-#: The colour of each label and button, and the first colour behind it that is not transparent.
+#: Colour of each label and button, and the colour of its background
 _COLOURS = """return [...document.querySelectorAll("label, button, .mantine-Slider-markLabel")]
   .filter((e) => e.offsetParent !== null && e.textContent.trim()).map((e) => {
     let behind = e;
@@ -307,7 +307,7 @@ _COLOURS = """return [...document.querySelectorAll("label, button, .mantine-Slid
 
 
 def _contrast(*colours: list[float]) -> float:
-    """The contrast of WCAG 2.2 of two opaque colours."""
+    """Return the contrast of two opaque colours, as WCAG 2.2 defines it."""
     light = []
     for colour in colours:
         parts = np.array(colour[:3]) / 255.0
@@ -316,7 +316,7 @@ def _contrast(*colours: list[float]) -> float:
     return max(light) / min(light)
 
 
-#: The element with the focus: its kind, the width and colour of its outline, and the colour behind it.
+#: Kind of the element with the focus, width and colour of its outline, and colour of its background
 _RING = """const e = document.activeElement, style = getComputedStyle(e);
   const colour = (x) => getComputedStyle(x).backgroundColor;
   let behind = e.parentElement;
@@ -368,7 +368,7 @@ def _until(holds: Callable[[], bool]) -> bool:
 @pytest.mark.browser
 @pytest.mark.parametrize("width", [1280, 390])
 def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium: Browser, width: int) -> None:
-    # Without its shapes, and nothing is drawn: by software a browser would spend its time there.
+    # The robot has no shapes, because a browser draws them slowly in software.
     bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("panda").urdf, flags=re.DOTALL)
     with shown_robot(urdfkin.load(bare)) as viewer:
         n = len(viewer.sliders.rows)
@@ -398,7 +398,7 @@ def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium:
         assert (np.delete(viewer.q, 4) == np.delete(before, 4)).all(), "the others stay, to the bit"
         assert abs(np.rad2deg(viewer.q[4] - before[4]) - 1.0) < 0.01, "one key moves one degree"
         assert _until(equal)
-        # On a telephone, too, nothing lies beyond the edge.
+        # On a phone, too, all sliders are within the window.
         assert all(0 <= left < right <= width for left, right in chromium.js(_EDGES)[:n])
         chromium.screenshot(f"viewer-{width}")
 
