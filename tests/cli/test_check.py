@@ -7,7 +7,7 @@ from urllib.parse import unquote_to_bytes, urlsplit
 
 import pytest
 
-from tests.cli.running import good, python, refused, urdfkin
+from tests.cli.running import good, refused, urdfkin
 
 GOOD = '<robot name="r">\n  <link name="a"/>\n</robot>\n'
 WARNED = '<robot name="">\n  <link name="a"/>\n</robot>\n'
@@ -62,14 +62,6 @@ def test_explain_prints_a_page_and_lists_all_codes() -> None:
     assert good("explain urdf502").text.startswith("URDF502 axis-without-direction (error)")
     assert urdfkin("explain").text.count("\n") > 60
     assert urdfkin("explain URDF999").code == 2
-
-
-def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> None:
-    program = (
-        "import sys; from urdfkin.urdf.lint import check; check('<robot/>');"
-        "print({'numba', 'yourdfpy', 'pinocchio', 'lxml', 'trimesh'} & set(sys.modules))"
-    )
-    assert python(program).stdout == "set()\n"
 
 
 NAMES = [b"r\xff\xe9.urdf", b"a b:c%41?#\\[].urdf", "ä\u202e.urdf".encode(), b"a\nb.urdf"]

@@ -228,8 +228,8 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio.
 
-    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. `urdfkin COMMAND --help` shows a
-    command's options and examples.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help`
+    shows the options of a command, and an example.
     """
 
 

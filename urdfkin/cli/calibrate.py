@@ -144,7 +144,7 @@ def command(
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # JSON as a text does not get the line `check`.
+        # JSON that is already text is written without the line `check`.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 

@@ -259,11 +259,11 @@ limit_options = combine(
     help="Write the findings, or the patch of --diff, to this file.",
     show_default="standard output",
 )
-@click.option("--fix", is_flag=True, help="Apply the automatic fixes to the files.")
+@click.option("--fix", is_flag=True, help="Make the automatic fixes in the files.")
 @click.option(
-    "--unsafe-fixes", is_flag=True, help="Also apply fixes that rotate a joint by more than a rounding error."
+    "--unsafe-fixes", is_flag=True, help="Also make fixes that rotate a joint by more than a rounding error."
 )
-@click.option("--diff", is_flag=True, help="Print the changes of --fix as a patch, without applying them.")
+@click.option("--diff", is_flag=True, help="Print a patch of the changes that --fix would make.")
 @click.option("--statistics", is_flag=True, help="Print only the number of findings of each code.")
 @choice_options
 @click.option(

@@ -190,7 +190,7 @@ def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if an output file cannot be written."""
     for path in filter(None, paths):
         try:
-            if path.exists() and not path.is_file():  # a device needs no temporary file
+            if path.exists() and not path.is_file():  # a device is written without a temporary file
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
                 pass

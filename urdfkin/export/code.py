@@ -82,7 +82,7 @@ class FrameCode:
 
     @property
     def head(self) -> list[str]:
-        """The lines of a file's header, without comment marks; the first line of unverified code says so."""
+        """The lines of a file's header, without comment marks; unverified code states this in the first line."""
         verdict, *rest = self.proof.lines
         subject = f"{self.robot}, frame {self.frame}"
         about = f"Kinematics of {subject}: straight-line code for this robot and frame."
@@ -281,6 +281,6 @@ def _arithmetic(x: Node, text: Callable[[Number, int], str], precedence: int) ->
         own, result = _SIGN, f"-{text(x.of[0], _PRODUCT)}"
     else:
         own = _PRECEDENCE[x.op]
-        # Brackets as in a + (b + c) keep the order of the check with Pinocchio.
+        # Brackets as in a + (b + c) keep the order of operations that was compared with Pinocchio.
         result = f"{text(x.of[0], own)} {x.op} {text(x.of[1], own + 1)}"
     return result if own >= precedence else f"({result})"

@@ -129,7 +129,7 @@ def _compile(text: str, command: list[str]) -> bytes:
 
 
 def _load(data: bytes) -> ctypes.CDLL:
-    if not hasattr(os, "memfd_create"):  # macOS needs a file
+    if not hasattr(os, "memfd_create"):  # macOS cannot load a library from memory
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder, f"robot{next(_names)}.so")
             library.write_bytes(data)
@@ -314,8 +314,6 @@ class CompiledFrame:
             return one
         return self._compute_batch("acceleration", (q, v, a), out, threads)
 
-    # -- inside --------------------------------------------------------------------------------------------
-
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
         with compiling, importing:
             from urdfkin.compiled.machine.single import arrays_are_known, called
@@ -331,7 +329,7 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # later calls stay fast without this check
+            warn_of_degrees(self._tree, q)  # only the first call warns, so that later calls stay fast
         return found
 
     def _machine_code(self, row: Quantity) -> Any:

@@ -324,7 +324,7 @@ DIALECTS = {
         about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
         decorator='@njit(error_model="numpy")',
-        first_lines=_lengths('"{x} needs {width} numbers"'),  # Numba needs a constant text
+        first_lines=_lengths('"{x} needs {width} numbers"'),  # Numba supports only constant messages
         result=_in_array("np.empty({0})", ""),
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),

@@ -8,16 +8,17 @@ from __future__ import annotations
 import io
 import threading
 import time
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from urdfkin.errors.escape import markdown_text
-from urdfkin.model.tree import FloatArray
-from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.robot.trajectory import Trajectory
 from urdfkin.view.plot import foot
+
+if TYPE_CHECKING:
+    from urdfkin.view.viewer import Viewer
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 #: Maximum number of updates per second while the viewer plays
@@ -26,22 +27,10 @@ _UPDATE_RATE = 20.0
 _FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)
 
 
-class Screen(Protocol):
-    server: Any
-    robot: Robot
-    frame: Any
-    reference: Any
-
-    @property
-    def file_name(self) -> str: ...
-
-    def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None: ...
-
-
 class Player:
     """The controls of a trajectory; `sample` is the index of the sample that the viewer shows."""
 
-    def __init__(self, viewer: Screen, trajectory: Trajectory) -> None:
+    def __init__(self, viewer: Viewer, trajectory: Trajectory) -> None:
         self._viewer, self.trajectory, self.sample = viewer, trajectory, 0
         self._playing, self._is_setting = threading.Event(), False
         gui, t = viewer.server.gui, trajectory.t
@@ -139,8 +128,8 @@ class Player:
 def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
     """Return the browser's picture of the robot.
 
-    A busy browser may draw the previous pose again, so a picture that equals the last one is repeated up to
-    four times.
+    A busy browser may draw the previous pose again, so a picture that equals the last one is requested again,
+    up to four times.
     """
     for _ in range(5):
         picture: np.ndarray = client.get_render(height=_SIZE[1], width=_SIZE[0], timeout=60.0)

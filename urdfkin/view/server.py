@@ -164,7 +164,7 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: Messages that the server accepts from a page: a control has changed
+#: The only message that the server accepts from a page: a control has changed
 _ACCEPTED = ("GuiUpdateMessage",)
 #: Replacements in viser's page that give the nonce to its script, and to the script that this script creates
 _SCRIPTS = (
