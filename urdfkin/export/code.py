@@ -82,7 +82,7 @@ class FrameCode:
 
     @property
     def head(self) -> list[str]:
-        """The lines of a file's header, without comment marks; unverified code states this in the first line."""
+        """Lines of a file's header, without comment marks; the first line states that code is unverified."""
         verdict, *rest = self.proof.lines
         subject = f"{self.robot}, frame {self.frame}"
         about = f"Kinematics of {subject}: straight-line code for this robot and frame."
