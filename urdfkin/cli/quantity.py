@@ -222,11 +222,15 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
         "rows": list(quantity.labels) or None,
         "coordinates": list(x.coordinate_names),
         "rates": list(x.rate_names),
-        **({} if x.t is None else {"t": x.t.tolist()}),
-        **{letter: getattr(x, letter).tolist() for letter in quantity.inputs},
+        **_input_data(x, quantity.inputs),
         **x.settings,
         "result": result.tolist(),
     }
+
+
+def _input_data(x: Inputs, letters: str) -> dict[str, Any]:
+    times = {} if x.t is None else {"t": x.t.tolist()}
+    return times | {letter: getattr(x, letter).tolist() for letter in letters}
 
 
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
@@ -323,8 +327,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
             "rows": list(SIX),
             "joints": list(found.joints),
             "kinds": list(KINDS),
-            **({} if x.t is None else {"t": x.t.tolist()}),
-            **{letter: getattr(x, letter).tolist() for letter in "qva"},
+            **_input_data(x, "qva"),
             **{name: getattr(found, name).tolist() for name in ("base", "terms", "total")},
         }
 
@@ -563,8 +566,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             "rows": rows,
             "coordinates": list(x.coordinate_names),
             "rates": list(x.rate_names),
-            **({} if x.t is None else {"t": x.t.tolist()}),
-            "q": x.q.tolist(),
+            **_input_data(x, "q"),
             **x.settings,
             "singular_values": plain(found.values._asdict()),
             "condition": plain(found.condition._asdict()),
