@@ -452,11 +452,6 @@ def read_inputs(
     """Read q, v and a as the user wrote them; a single sample is repeated for each sample of a batch.
 
     `conversion` converts the values to urdfkin's convention. Error messages name `option` as the source of q.
-
-    Raises:
-        InputError: A number is invalid, or there are too few or too many numbers. The numbers of samples
-            differ. Or --seed has no effect.
-        SourceError: a file that cannot be read.
     """
     import numpy as np
 
@@ -583,13 +578,7 @@ def base_options(inputs: str) -> Callable[[_F], _F]:
 def with_base(
     x: Inputs, placement: str | None = None, velocity: str | None = None, acceleration: str | None = None
 ) -> Inputs:
-    """Add the motion of the root link, if the user gave one; a single motion applies to all samples.
-
-    Raises:
-        InputError: A number is invalid, or there are too few or too many numbers. A quaternion is not of
-            length 1. Or the numbers of samples differ.
-        SourceError: a file that cannot be read.
-    """
+    """Add the motion of the root link, if the user gave one; a single motion applies to all samples."""
     from urdfkin.model.base_motion import BaseMotion
 
     if placement is None and velocity is None and acceleration is None:

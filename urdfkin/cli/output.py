@@ -163,10 +163,7 @@ def report_compilation() -> Iterator[None]:
 
 
 def console(*, err: bool = False) -> Console:
-    """Return a console with the width of the terminal.
-
-    If the output goes to a pipe, the variable COLUMNS sets the width. Without COLUMNS, no line is wrapped.
-    """
+    """Return a console with the width of the terminal or, for a pipe, of the environment variable COLUMNS."""
     from urdfkin.cli.terminal import Terminal
 
     stream = sys.stderr if err else sys.stdout
@@ -222,10 +219,7 @@ def exit_code(certificate: Certificate) -> int:
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
-    """Return the last line of the output, and the exit code, for the result of Pinocchio's check.
-
-    `check` is, for example, a `TableCheck`. It is None if nothing was checked.
-    """
+    """Return the last line of the output, and the exit code, for a `TableCheck` or a similar result."""
     from urdfkin.verify.pinocchio import version
 
     by = f"Pinocchio {version()}"

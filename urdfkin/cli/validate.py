@@ -51,18 +51,11 @@ def judge_all(
 ) -> ValidationReport:
     """Run the accuracy study of every compared robot, and return the report with the results of the study.
 
-    If the study of a robot fails, a line on stderr states the reason. An interrupt skips the remaining
-    robots.
-
-    Args:
-        report: The report of `validate` for the same robots, in the same order. With `shard`, the report of
-            this part.
-        given: Robots, or their sources.
-        settings: Settings of the study.
-        store: Folder of --store, into which the results of the study are also written; None: no folder.
-        shard: The value I/N of --shard. Only robots whose first samples belong to part I are studied.
-        retry: Whether to repeat a study that failed in an earlier run.
-        how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
+    `report` is the report of `validate` for the robots `given`, or for the part I of them if `shard` is I/N.
+    Then only robots whose first samples belong to part I are studied. The results are also written to the
+    folder `store`. With `retry`, a study that failed in an earlier run is repeated. `how` are arguments of
+    `load`. If the study of a robot fails, a line on stderr states the reason. An interrupt skips the
+    remaining robots.
     """
     from urdfkin.validation.accuracy_store import NotJudged
     from urdfkin.validation.campaign import shares

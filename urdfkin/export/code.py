@@ -116,15 +116,9 @@ def code_of(
 ) -> FrameCode:
     """Return the code of a frame, with test vectors and the result of the comparison with Pinocchio.
 
-    Args:
-        verifier: The verifier of the robot.
-        plan_of: Function that returns the compiled tree of the joints that move the given links.
-        frame: Name of a link or joint.
-        quantities: Names of the quantities, for example "jacobian_rate".
-        reference: Reference frame of velocities, Jacobians and accelerations.
-        name: Prefix of the functions; by default the names of the robot and of the frame.
-        verify: Whether to compare with Pinocchio; None: as the robot was loaded.
-        about: Text for the file's header: the Denavit-Hartenberg table or the screws.
+    `plan_of` returns the compiled tree of the joints that move given links. By default, the prefix `name` of
+    the functions consists of the names of the robot and of the frame. `about` is text for the file's header:
+    the Denavit-Hartenberg table or the screws.
 
     Raises:
         UnknownNameError: the frame, a quantity or the reference is unknown.

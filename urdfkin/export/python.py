@@ -189,12 +189,9 @@ def _demand(
 ) -> str:
     """Return the code of the function `_demand`, which checks an input.
 
-    Args:
-        wrong: Code that is true if the input has numbers of another type.
-        given: Further parameters of `_demand`, each with a comma.
-        numbers: Description of the accepted numbers.
-        array: Description of the accepted container.
-        is_array: Code that is true if the input is such a container; "" for no test.
+    `wrong` is code that is true for numbers of a wrong type; `numbers` describes the accepted numbers.
+    `is_array` is code that is true for an accepted container ("" for no test), which `array` describes.
+    `given` are further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
