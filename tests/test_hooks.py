@@ -229,7 +229,7 @@ def test_the_action_fails_where_two_files_of_a_robot_differ(tmp_path: Path) -> N
     assert compare("a.urdf\nb c.urdf") == 1
     assert "SAME" in summary.read_text()
     assert "DIFFERS" in summary.read_text()
-    assert summary.read_text().count("origin x") == 1  # the list of differences follows the answer
+    assert summary.read_text().count("origin x") == 1  # only the list of differences has this text
     assert compare("a.urdf\nb c.urdf", "0.01") == 0
     assert compare("a.urdf\nb c.urdf", "1; touch RUN") == 2
     assert not (tmp_path / "RUN").exists()

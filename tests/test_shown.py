@@ -111,7 +111,7 @@ def test_a_name_from_a_strangers_file_is_text_in_every_form(name: str) -> None:
     for made in sheets():
         sheet, tame = made(name), made("tame")
         tags = [tag for tag, _ in Page(sheet.html()).skeleton]
-        while tags:  # every element ends inside the one in which it begins
+        while tags:  # elements are nested
             end = next(i for i, tag in enumerate(tags) if tag.startswith("/"))
             assert tags[end] == f"/{tags[end - 1]}"
             assert tags[end - 1] in {"div", "p", "b", "table", "thead", "tbody", "tr", "th", "td"}

@@ -136,7 +136,7 @@ def test_no_name_becomes_an_element_or_a_script_in_any_panel_and_it_is_shown_as_
     browser.settle()
     assert browser.js("return window.hacked === undefined")
     images = browser.js("return [...document.querySelectorAll('img')].map((i) => i.src)")
-    assert [image for image in images if not image.startswith("data:image/svg+xml,")] == []  # viser's mark
+    assert [image for image in images if not image.startswith("data:image/svg+xml,")] == []  # viser's logo
     links = browser.js("return [...document.querySelectorAll('a')].map((a) => a.href)")
     assert [link for link in links if "evil" in link or "javascript" in link] == []
     # An error message with a name

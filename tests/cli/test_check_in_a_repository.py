@@ -168,7 +168,7 @@ def test_codes_are_ignored_in_some_files_and_by_no_settings_of_others(
     settings('per-file-ignores = { "legacy/*" = ["URDF5"] }')
     assert found() == [("arm.urdf", "URDF503"), ("inner/arm.urdf", "URDF503")]
     settings('ignore = ["URDF503"]')
-    monkeypatch.chdir("inner")  # beyond another repository's top
+    monkeypatch.chdir("inner")  # inside another repository
     assert found() == [("arm.urdf", "URDF503")]
     Path("pyproject.toml").write_text("[tool.other]\nignor = 1\n")
     assert found() == [("arm.urdf", "URDF503")]
@@ -204,9 +204,9 @@ def test_findings_in_a_baseline_do_not_fail_the_check_and_new_findings_do(here: 
     assert (done.code, done.text, done.err) == (0, "", "wrote known.json: 2 findings in the baseline\n")
     done = check("--strict", "--baseline", "known.json")
     assert (done.code, done.text) == (0, "no findings in 2 files (already known: 2)\n")
-    arm.write_text("\n\n" + LONG.replace("<axis", '<axis  shade="3"'))  # known again on another line
+    arm.write_text("\n\n" + LONG.replace("<axis", '<axis  shade="3"'))  # still known on another line
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF208")]
-    arm.write_text(LONG.replace("0 0 2", "0 0 3"))  # what is touched is new
+    arm.write_text(LONG.replace("0 0 2", "0 0 3"))  # a finding of a changed element is new
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF503")]
     arm.write_text(GOOD)
     assert (

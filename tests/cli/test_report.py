@@ -99,7 +99,7 @@ def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Pa
     assert done.code == 1
     assert "REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert (tmp_path / "c.md").read_text().startswith("## ❌")
-    assert urdfkin("report", "compare", bad, good).code == 1  # a robot is gone
+    assert urdfkin("report", "compare", bad, good).code == 1  # the second report lacks a robot
     assert urdfkin("report", "compare", good, good).code == 0
     found = json.loads(urdfkin("report", "compare", good, bad, "--format", "json").text)
     assert found["schema"] == "urdfkin-comparison/1"

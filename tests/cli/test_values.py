@@ -80,7 +80,7 @@ def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
     line += " talos --frame gripper_left_base_link --q random:1"
-    *lines, _ = urdfkin(line).text.splitlines()  # the last one is the certificate
+    *lines, _ = urdfkin(line).text.splitlines()  # the last line states the check
     assert max(map(len, lines[2:])) <= columns  # the terminal wraps the text above the table
     path = [name for name in library.load("talos").rate_names if name.startswith(("torso", "arm_left"))]
     assert len(path) == 9

@@ -71,7 +71,7 @@ def test_it_takes_any_batch_and_writes_where_it_is_told(arm: Robot) -> None:
 
 
 def test_results_that_go_past_the_caches_are_those_of_small_batches_wherever_they_begin(arm: Robot) -> None:
-    fast, n = arm.compiled(arm.tip_frame), 30_000  # 2.9 MB
+    fast, n = arm.compiled(arm.tip_frame), 30_000  # results of 2.9 MB
     q = arm.sample(n, seed=3)
     expected = np.concatenate([fast.jacobian(q[i : i + 1000]) for i in range(0, n, 1000)])
     for first in range(8):

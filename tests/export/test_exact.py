@@ -131,7 +131,7 @@ def test_the_command_reports_exact_expressions_that_were_not_compared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: Any = exact_module.exact_functions
-    # The expressions in double precision were compared.
+    # Only the comparison of the exact expressions is turned off.
     monkeypatch.setattr(exact_module, "exact_functions", lambda *given: made(*given[:-1], False))
     done = command("export planar_two_link --to sympy-exact -o", str(tmp_path / "arm.py"))
     assert done.code == 3

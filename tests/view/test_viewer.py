@@ -89,7 +89,7 @@ def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> 
         viewer.set_q(q)
         np.testing.assert_array_equal(viewer.q, q)
         np.testing.assert_allclose(shown(viewer), q, rtol=1e-15)
-        viewer.sliders.handles[seed].value = 0.25  # in either unit
+        viewer.sliders.handles[seed].value = 0.25  # 0.25 degrees or radians
         np.testing.assert_allclose(shown(viewer), viewer.q, rtol=1e-15)
         assert checked(viewer.robot.tree, viewer.words_of_q.value, "q").tolist() == viewer.q.tolist()
     far = np.full(viewer.robot.nq, 7.0)  # beyond every limit of a UR5
@@ -254,7 +254,7 @@ def test_a_browser_draws_it_without_errors_and_asks_nothing_elsewhere(viewer: Vi
     viewer.ellipsoid.value, viewer.columns.value = "linear", "linear"
     viewer.update()
     address = f"http://127.0.0.1:{viewer.server.get_port()}"
-    with opened(tmp_path, width=640, height=400) as browser:  # drawn by software, pixel by pixel
+    with opened(tmp_path, width=640, height=400) as browser:  # the browser draws slowly in software
         browser.requests()
         browser.chrome.get(viewer.server.address)
         browser.wait_for("verified")
@@ -393,7 +393,7 @@ def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium:
             assert _until(lambda before=before: bool((viewer.q != before).any())), label  # type: ignore[misc]
             assert _until(equal), label
         before = viewer.q.copy()
-        chromium.chrome.find_elements("css selector", "[role=slider]")[4].send_keys("\ue014")  # a step right
+        chromium.chrome.find_elements("css selector", "[role=slider]")[4].send_keys("\ue014")  # right arrow key
         assert _until(lambda: viewer.q[4] != before[4])
         assert (np.delete(viewer.q, 4) == np.delete(before, 4)).all(), "the others stay, to the bit"
         assert abs(np.rad2deg(viewer.q[4] - before[4]) - 1.0) < 0.01, "one key moves one degree"
