@@ -197,7 +197,7 @@ def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
 def test_code_with_a_proof_is_the_same_under_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
     def code(name: str) -> list[str]:
         written = code_of_chain(table(name), ["placement"], name="chain", verify=False)
-        words = written.words["q"]
+        words = written.identifiers["q"]
         assert all(re.fullmatch(r"\w+", word, re.ASCII) for word in words)
         found = []
         for form in ("numpy", "casadi", "c", "matlab"):

@@ -1,4 +1,4 @@
-"""What a user gets wrong: exit 2, one clear message on stderr, nothing on stdout, never a traceback."""
+"""A mistake of the user gives exit code 2, one message on stderr, nothing on stdout and no traceback."""
 
 import errno
 import os
@@ -169,7 +169,7 @@ def test_a_mistake_gives_one_clear_message_and_exit_2(
 def test_a_report_that_must_not_be_written_is_refused_before_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Permissions do not bind the superuser, whom tests may run as: the system's answer is stood in for.
+    # Tests may run as the superuser, who may write every file, so the system's error is simulated.
     def refuse(*args: object, **kwargs: object) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 

@@ -1,4 +1,4 @@
-"""Progress says what is done, how fast, how long still and what failed; in lines where nobody watches."""
+"""Progress shows finished work, speed, remaining time and failures; without a terminal, as lines."""
 
 import json
 from dataclasses import replace

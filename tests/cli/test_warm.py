@@ -1,4 +1,4 @@
-"""What is compiled is said, once and by its name, and nothing is compiled for input that cannot be used."""
+"""Compilation is reported once for each kernel, and wrong input starts no compilation."""
 
 import time
 from pathlib import Path
@@ -81,7 +81,7 @@ def test_programs_are_told_by_one_warning_of_a_logger(
         with kernel_cache.compile_event(name) as missed:
             missed()
     with kernel_cache.compile_event("velocities"):
-        pass  # read from disk
+        pass  # the kernel is in the cache
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("urdfkin", "WARNING")
     assert "compiling placements" in record.getMessage()
