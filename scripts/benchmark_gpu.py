@@ -4,8 +4,8 @@
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. The share of the memory's bandwidth is the number of bytes that a configuration
-reads and writes, divided by the bytes that a copy in the GPU's memory reads and writes in the same time.
+median of several launches. The share of the memory's bandwidth is a ratio of two data rates: that of the
+code, and that of a copy in the GPU's memory. A data rate counts the bytes that are read and written.
 
 If PyTorch with CUDA is installed, the program also measures the export for PyTorch, called directly and by
 `torch.compile`. If PyTorch Kinematics is installed, the program also measures its Jacobian. The numbers of
