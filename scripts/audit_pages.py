@@ -252,10 +252,12 @@ def look(
                 faults.append(what)
             else:
                 print(f"  note {where}: {what[:300]}", flush=True)
-    faults += [f"table {name}: {inner} pixels wide in {room}" for name, inner, room in browser.js(_CUT)]
+    faults += [
+        f"table {name}: {inner} pixels wide, but its box has {room}" for name, inner, room in browser.js(_CUT)
+    ]
     if output is not None:
         for k in range(browser.js("return document.querySelectorAll('canvas').length")):
-            # The browser draws a view when it is on the screen.
+            # The browser draws a 3D view only while the view is on the screen.
             browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
             browser.settle()
         browser.js("scrollTo(0, 0)")

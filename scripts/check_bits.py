@@ -1,10 +1,11 @@
 """Check that results have equal bits: for a single configuration and in a batch, before and after a change.
 
-    python scripts/check_bits.py [ROBOT ...]           # compare single, prepared, batched, joint, interpreted
+    python scripts/check_bits.py [ROBOT ...]           # compare all kinds of calls of this run
     python scripts/check_bits.py --write before.npz    # also store the results
     python scripts/check_bits.py --against before.npz  # also compare with stored results
 
-The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
+The script checks every robot of the catalogue, every quantity and all three reference frames. The kinds of
+calls are single calls, prepared evaluators, batches, several frames in one pass, and plain Python. Fused
 multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine. If
 results differ from the stored results, the script prints the largest difference as a fraction of the stored
 bound.
@@ -44,7 +45,7 @@ LENGTHS = (1, 2, 7, 8, 9, 100)
 THREADS = (None, 1, 2, 3)
 #: Numbers of configurations and of frames whose results are stored.
 KEPT, FRAMES = 9, 6
-#: Index of the configuration that is computed with Python's numbers and with kernels.
+#: Index of the configuration that is computed in plain Python and by kernels.
 INTERPRETED = 3
 WAYS: tuple[Way, ...] = ("interpreted", "compiled")
 
@@ -128,7 +129,7 @@ def differing(subject: Subject, now: Arrays) -> Iterator[str]:
 
 
 def differing_interpreted(subject: Subject) -> Iterator[str]:
-    """Yield the results that differ between Python's numbers and the kernels."""
+    """Yield the results that differ between plain Python and the kernels."""
     for what, quantity, reference, inputs in subject.results():
         row, found = [x[INTERPRETED] for x in inputs], []
         for way in WAYS:

@@ -154,7 +154,7 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
-        with warnings.catch_warnings():  # findings about the robot's limits and axes
+        with warnings.catch_warnings():  # hide warnings about the robot's limits and axes
             warnings.simplefilter("ignore", urdfkin.UrdfWarning)
             path = urdfkin.load(to_urdf(job.table), verify=False).chain(tip, base)
         order = [job.table.joint_names.index(name) for name in path.joint_names]

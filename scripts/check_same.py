@@ -86,12 +86,12 @@ def summary(some: list[dict[str, Any]]) -> Iterator[str]:
         widths = [one["upper"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
         found = [one["lower"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
         if widths:
-            above = f"{statistics.median(widths) - 1:.1%} (median), {max(widths) - 1:.1%} (most)"
+            above = f"{statistics.median(widths) - 1:.1%} (median), {max(widths) - 1:.1%} (largest)"
             yield f"{what}: {len(widths)}; the upper bound is {above} above the result of the search,"
-            yield f"  the lower {1 - min(found):.1%} below"
+            yield f"  the lower bound at most {1 - min(found):.1%} below"
     seconds = [one["seconds"] for one in some if one["change"] in UNLIKE]
     if seconds:
-        yield f"seconds with bounds: median {statistics.median(seconds):.1f}, most {max(seconds):.1f}"
+        yield f"seconds with bounds: median {statistics.median(seconds):.1f}, largest {max(seconds):.1f}"
     yield from (f"WRONG: {json.dumps(one)}" for one in (*wrong, *missed))
 
 

@@ -9,7 +9,7 @@ There are several families of files:
 |---|---|
 | mutants | mutants of the shipped robots |
 | names, prefixes, versions, ..., everything | random robots with one kind of unusual content, or all kinds |
-| MJCF | free bodies, equalities and default classes; MuJoCo checks them independently |
+| MJCF | free bodies, equality constraints and default classes; MuJoCo checks them independently |
 
 Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, for bases
 near to and far from the origin, and compared with Pinocchio. The tests run in a worker process, which is

@@ -4,8 +4,8 @@ For each row, the script compares a library's result with several candidate defi
 motion. It writes the definition that matches. A test checks that the page is current.
 
 The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
-first runs each installed library on all robots of the catalogue, in the library's convention. The script
-writes the results to the same file.
+first runs each installed library on all robots of the catalogue, in the library's convention, and writes the
+results to conventions.toml.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure
@@ -58,7 +58,7 @@ ARM = _robot(  # the joints are in reverse alphabetical order
     _joint("b", "revolute", "l1", "l2", '<axis xyz="0 1 0"/>'),
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
-#: A robot that shows the order of coordinates: joints z and a at the base, and joint k behind z.
+#: A robot that shows the order of coordinates: joints z and a at the base, and joint k after z.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),

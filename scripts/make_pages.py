@@ -3,7 +3,7 @@
     python scripts/make_pages.py                  # all pages
     python scripts/make_pages.py findings judge   # some pages
 
-Run this script after a change of an equation, of a code, of a robot or of a schema. Tests compare the pages
+Run this script after a change of an equation, a finding, a robot or a schema. Tests compare the pages
 with the output of this script. The accuracy study and the enclosures take minutes, so tests check only a part
 of their numbers. The figures of docs/performance.md and its picture are those of docs/performance.json, which
 `python scripts/benchmark.py --json docs/performance.json` writes.
@@ -254,9 +254,9 @@ def _of_chains() -> Iterator[tuple[object, ...]]:
 
 
 def _proofs(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
-    """Return the enclosures of random motions, and the processor time of one in ms."""
+    """Return the enclosures of random motions, and the processor time (ms) of one motion."""
     found, times = [], []
-    for seed in (0, *range(count)):  # the first one is not timed
+    for seed in (0, *range(count)):  # the first motion is not timed
         v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))
         q, begin = robot.sample(1, seed)[0], time.process_time()
         found.append(robot.enclose(q, v, a, robot.tip_frame, digits=digits))

@@ -62,7 +62,7 @@ def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> No
     wall: dict[str, list[float]] = {name: [] for name in ways}
     processor: dict[str, list[float]] = {name: [] for name in ways}
     for name in ways * rounds:
-        begin, before = time.perf_counter(), sum(os.times()[:4])  # with the finished children
+        begin, before = time.perf_counter(), sum(os.times()[:4])  # includes finished child processes
         report = WAYS[name](robots, samples=samples)
         wall[name].append(time.perf_counter() - begin)
         processor[name].append(sum(os.times()[:4]) - before)
@@ -72,7 +72,7 @@ def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> No
     for name in ways:
         a_second = [results / median(seconds[name]) for seconds in (wall, processor)]
         share = median(p / s for p, s in zip(processor[name], processor[ways[0]], strict=True))
-        print(f"{name}: {a_second[0]:,.0f} results/s, {a_second[1]:,.0f} a second of processor;", end=" ")
+        print(f"{name}: {a_second[0]:,.0f} results/s, {a_second[1]:,.0f} per processor second;", end=" ")
         print(f"processor time {share:.3f} of {ways[0]}")
 
 

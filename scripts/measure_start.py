@@ -32,7 +32,7 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 @dataclass(frozen=True)
 class Row:
     what: str  # name of the process on the page
-    words: tuple[str, ...]  # arguments of the interpreter; ROBOT stands for a URDF outside the catalogue
+    words: tuple[str, ...]  # arguments of the interpreter; ROBOT is the path of a URDF file
     most: float = math.inf  # limit of the time; 1 is the time of `import numpy, pinocchio`
     fresh: bool = False  # whether the process starts with an empty kernel cache
 

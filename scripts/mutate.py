@@ -6,10 +6,10 @@
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_slips.toml
 
 The script runs the quick tests near the mutated file. With --slow it then runs the slow tests near this file,
-and with --whole the whole test suite. The script prints every undetected mutant. Mutants that
-docs/mutation.md lists as harmless are skipped. In the past, no test detected the named mutants. A named
-mutant replaces a text of a file, and one given test must now fail. Exit 0: all mutants are detected or
-harmless. 1: some mutants are not detected, or there is no mutant. 2: a part does not exist.
+and with --whole all other quick tests. The script prints every undetected mutant, and skips the mutants
+that docs/mutation.md lists as harmless. In the past, no test detected the named mutants. A named mutant
+replaces a text of a file, and one given test must now fail. Exit 0: all mutants are detected or harmless.
+1: some mutants are not detected, or there is no mutant. 2: a part does not exist.
 """
 
 import argparse
@@ -53,7 +53,7 @@ def files(parts: list[str]) -> list[Path]:
     found = {name: path for name, path in below.items() if name not in COMPILED}
     for part in parts:
         if not any(name.startswith(part) for name in found):
-            raise ValueError(f"{part}: no file below {PACKAGE.name}/ that can be mutated begins so")
+            raise ValueError(f"{part}: no file below {PACKAGE.name}/ with this prefix can be mutated")
     return [path for name, path in found.items() if not parts or name.startswith(tuple(parts))]
 
 

@@ -3,10 +3,10 @@
     python scripts/run_exported.py torch robot_torch.py robot_array.py
     python scripts/run_exported.py jax robot_jax.py robot_array.py
 
-It runs each file's own check; a file for any array library runs in the namespace of the named library.
-Derivatives of the Jacobian by PyTorch and JAX are compared with the Hessian's true values in the file, within
-the Hessian's bound, if the file has a Hessian. For the first file of PyTorch code, the script also compiles
-the functions with `torch.compile`. `scripts/check_exports.py --library` calls this script.
+The script runs each file's own check. A file of the format `array` runs with the named library. If a file has
+a Hessian, the derivatives of the Jacobian by PyTorch or JAX are compared with the Hessian's true values in
+the file, within the Hessian's bound. For the first file of PyTorch code, the script also compiles the
+functions with `torch.compile`. `scripts/check_exports.py --library` calls this script.
 """
 
 import importlib

@@ -180,7 +180,7 @@ def wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Itera
 
 
 def _loaded(file: Path) -> urdfkin.Robot:
-    """Return the robot of a file; a root link without mass gives a stage with several articulations."""
+    """Return the robot of a file. If a USD file has several articulations, read all of them."""
     try:
         return urdfkin.load(file)
     except urdfkin.UrdfkinError as error:

@@ -72,7 +72,7 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the timed tasks for a batch, with different threads and memory; one only writes the output."""
+    """Yield the timed tasks for a batch, which differ in threads and memory; one writes only the output."""
     method, n = getattr(subject.robot, quantity), subject.n
     inputs = subject.inputs(quantity, n)
     out, own, floor = np.empty((3, n, *subject.width(quantity)))

@@ -115,7 +115,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
-    """Return the page with the figures in their places; raise ValueError if a place is missing or double."""
+    """Return the page with the figures inserted; raise ValueError if a place is missing or occurs twice."""
     parts: dict[str, list[str]] = {"machine": [machine_of(figures)]}
     for words in tables(figures):
         parts.setdefault(words.section, []).append(words.text)
