@@ -1,4 +1,4 @@
-"""What an MJCF file says and a tree cannot hold is said by `load`, word for word, and nothing else is."""
+"""`load` reports each part of an MJCF or USD file that a tree cannot represent, and nothing else."""
 
 import warnings
 from pathlib import Path
@@ -15,7 +15,7 @@ OF_USD = [code for code in OF_OTHERS if code.startswith("USD")]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("code", OF_USD)
-def test_the_examples_of_a_page_about_usd_have_the_finding_and_their_cures_have_none(
+def test_the_example_of_a_page_about_usd_has_the_finding_and_the_corrected_example_has_none(
     code: str, tmp_path: Path
 ) -> None:
     pytest.importorskip("pxr")
@@ -32,7 +32,7 @@ def test_the_examples_of_a_page_about_usd_have_the_finding_and_their_cures_have_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_each_thing_alone_is_said_in_its_words_and_nothing_else(case: Mjcf) -> None:
+def test_each_case_has_exactly_its_findings_and_warns_of_those_that_affect_the_motion(case: Mjcf) -> None:
     pytest.importorskip("mujoco")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
