@@ -485,7 +485,7 @@ class Reporter:
         attribute: str | None = None,
         found: str | None = None,
         remedy: str | None = None,
-        owner: str | None = None,
+        misplaced: bool = False,
         severity: Severity | None = None,
         position: tuple[int, int] = (1, 1),
         weight: float = 0.0,
@@ -495,8 +495,8 @@ class Reporter:
 
         - `at` is the element with the problem, and `attribute` the name of the wrong attribute.
         - `position` is the line and column of a finding without an element.
-        - `owner` is the tag of `at` if `at` is a link or joint in a wrong place. By default, the finding has
-          the name of the child of `<robot>` that contains `at`.
+        - The finding has the tag and the name of the child of `<robot>` that contains `at`. If `at` is
+          `misplaced`, the finding has the tag and the name of `at`.
         - `severity` replaces the severity of the rule.
         - `weight`: if findings with one code are combined, the finding with the greatest weight is reported.
         - `fix` returns the automatic fix, or None.
@@ -512,25 +512,15 @@ class Reporter:
                 kind.lines.append(position[0] if at is None else at.line)
             return
         line, column, width = (*position, 0) if position == (1, 1) else (*position, 1)
-        name = None
+        element, name = None, None
         if at is not None:
             line, column, width = self._place(at, attribute)
-            name = at.label if owner is None else at.attributes.get("name")
+            subject = at if misplaced else at.holder
+            element, name = subject.tag, subject.attributes.get("name") if at.parent is not None else None
         finding = Finding(
-            rule.id,
-            severity,
-            message,
-            found,
-            remedy,
-            self.file,
-            line,
-            column,
-            owner if owner or at is None else at.owner,
-            name,
-            rule.oracle,
-            width=width,
-            fix=None if fix is None or reason is not None else fix(),
-        )
+            rule.id, severity, message, found, remedy, self.file, line, column, element, name, rule.oracle,
+            width=width, fix=None if fix is None or reason is not None else fix(),
+        )  # fmt: skip
         if reason is None:
             kind.found.append((finding, weight))
         else:

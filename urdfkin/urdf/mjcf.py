@@ -274,7 +274,10 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         spec = _spec(mujoco, source)
         aligned, fuses = list(_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
         if whole and fuses:
-            _refuse_fused(aligned, name)
+            if merged := [body for body in aligned if body.bodies]:
+                what = "MuJoCo fuses static bodies into a free body and aligns its frame with their inertia"
+                where, remedy = f"{name}: body {merged[0].name}", 'write fusestatic="false" or align="false"'
+                raise InputError(what, where=where, remedy=remedy)
             fused = compiled(_spec(mujoco, source))
         spec.compiler.fusestatic = False
         notes = list(_left_out(mujoco, spec))
@@ -325,16 +328,6 @@ def _moving_below(body: Any) -> bool:
     for one in descendants:
         descendants += one.bodies
     return any(list(one.joints) for one in descendants)
-
-
-def _refuse_fused(aligned: list[Any], name: str) -> None:
-    for body in aligned:
-        if body.bodies:
-            raise InputError(
-                "MuJoCo fuses static bodies into a free body and aligns its frame with their common inertia",
-                where=f"{name}: body {body.name}",
-                remedy='write fusestatic="false" or align="false"',
-            )
 
 
 def _align_note(body: str, *, whole: bool) -> Listed:

@@ -446,10 +446,8 @@ class _StageReader:
             joints = sum(one.IsA(physics.Joint) for one in below)
             if bodies or joints:
                 what = f"the prototypes of this PointInstancer have {bodies} bodies and {joints} joints"
-                self._report(
-                    "left-out-of-usd", path, f"{what}, which are not read",
-                    "write each copy as a prim of its own, with a reference",
-                )  # fmt: skip
+                remedy = "write each copy as a prim of its own, with a reference"
+                self._report("left-out-of-usd", path, f"{what}, which are not read", remedy)
             else:
                 self._report("unused-in-usd", path, "kinematics does not use this PointInstancer")
         return prims
@@ -478,11 +476,9 @@ class _StageReader:
         if kind == "time samples" and not attribute.GetNumTimeSamples():
             return
         if not attribute.GetResolveInfo(self.pxr.Usd.TimeCode.Default()).HasAuthoredValue():
-            self._report(
-                "time-samples", str(attribute.GetPrim().GetPath()),
-                f"{attribute.GetName()} has {kind}, but no default value, so {instead}",
-                "write a default value",
-            )  # fmt: skip
+            where = str(attribute.GetPrim().GetPath())
+            what = f"{attribute.GetName()} has {kind}, but no default value, so {instead}"
+            self._report("time-samples", where, what, "write a default value")
 
     def _report_timed_transforms(self, prim: Any) -> None:
         """Report transform operations without a default value, for a prim and all prims above it."""
@@ -741,12 +737,10 @@ class _StageReader:
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
-            raise InputError(
-                "a limit of a joint is blocked, and OpenUSD's readers differ in its value",
-                where=f"{self.source}: joint {prim.GetPath()}",
-                found=f"{name} = None",
-                remedy="write a number; -inf and inf mean no limit",
-            )
+            message = "a limit of a joint is blocked, and OpenUSD's readers differ in its value"
+            where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
+            remedy = "write a number; -inf and inf mean no limit"
+            raise InputError(message, where=where, found=found, remedy=remedy)
         return float(self._value(prim, name))
 
     def _bounded(
@@ -1070,10 +1064,9 @@ class _StageReader:
             base, _, freedom = schema.partition(":")
             if base != "PhysxMimicJointAPI":
                 continue
-            leader = _target(prim, f"physxMimicJoint:{freedom}:referenceJoint")
-            gearing, offset = (
-                self._value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
-            )
+            prefix = f"physxMimicJoint:{freedom}"
+            leader = _target(prim, f"{prefix}:referenceJoint")
+            gearing, offset = self._value(prim, f"{prefix}:gearing"), self._value(prim, f"{prefix}:offset")
             multiplier = -1.0 if gearing is None else -float(gearing)
             self._compare_units(edge, leader)
             yield Mimic(leader, multiplier, -float(offset or 0.0) * own)
