@@ -25,7 +25,6 @@ from urdfkin.errors import InputError, OracleError
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.system.processes import ask_python
 from urdfkin.urdf import mjcf
-from urdfkin.urdf.lint.pages import find_rule, page
 from urdfkin.urdf.mjcf import Mjcf, is_mjcf
 from urdfkin.urdf.sources import Source
 from urdfkin.verify import mjcf_check, mjcf_process
@@ -244,15 +243,6 @@ def test_mjcf_is_loaded_from_text_bytes_streams_and_standard_input(monkeypatch: 
         assert robot.certificate().verified
     with pytest.raises(InputError, match="<bytes>: MuJoCo does not accept this MJCF"):
         loaded(b"<mujoco>\xff</mujoco>")
-
-
-@pytest.mark.parametrize("code", ["MJCF101", "MJCF102", "MJCF201"])
-def test_only_the_bad_example_on_the_page_of_a_finding_has_the_finding(code: str) -> None:
-    content, rule = page(code), find_rule(code.lower())
-    bad, good = (loaded(text, verify=False).findings for text in (content.example, content.cure))
-    assert {finding.severity for finding in bad if finding.code == code} == {rule.severity}
-    assert code not in {finding.code for finding in good}
-    assert command("explain", rule.slug).text.startswith(f"{code} {rule.slug} ({rule.severity.value})")
 
 
 @pytest.mark.slow

@@ -147,7 +147,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """How Pinocchio deviates from the URDF specification: it refuses or misreads legal content."""
+    """Deviation of Pinocchio from the URDF specification: legal content is refused or read differently."""
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -381,7 +381,7 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """A comment that silences findings. `used` are those of its codes that have silenced a finding."""
+    """A comment that silences findings with the codes `codes`. The codes `used` have silenced a finding."""
 
     comment: Comment
     codes: tuple[str, ...]
@@ -606,7 +606,7 @@ class Reporter:
         existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         return (
-            Fix(tuple(Edit(_blanks_before(self.data, start), end) for start, end in spans)) if spans else None
+            Fix(tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)) if spans else None
         )
 
     def without_element(self, at: Element) -> Fix | None:
@@ -620,7 +620,7 @@ class Reporter:
             if (closed := closing.match(self.data, end)) is None:
                 return None
             end = closed.end()
-        start = _blanks_before(self.data, at.offset, b" \t")
+        start = blanks_before(self.data, at.offset, b" \t")
         rest = _REST_OF_LINE.match(self.data, end)
         alone = rest is not None and self.data[start - 1 : start] in (b"\n", b"\r")
         return Fix((Edit(start, rest.end()) if rest is not None and alone else Edit(at.offset, end),))
@@ -664,7 +664,7 @@ def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]
         yield match[1].decode(), _AttributeSpan(line, column, cursor, (match.start(2) + 1, match.end(2) - 1))
 
 
-def _blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
+def blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
     """Return the index of the first byte of the white space that ends at `start`."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1

@@ -133,8 +133,7 @@ class Mjcf:
     def lengths(self, q: FloatArray) -> FloatArray:
         """Return an upper bound (n, frames), in m, on each frame's distance from the world's origin.
 
-        The bound is the sum of the lengths of all translations from the world to the frame. It is a factor of
-        bounds on rounding errors.
+        The bound is the sum of the lengths of all translations from the world to the frame.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -152,8 +151,8 @@ class Mjcf:
     def reference_angles(self, q: FloatArray) -> FloatArray:
         """Return a sum of joint angles (n, frames), in rad, for bounds on rounding errors.
 
-        For each frame, the sum of |q| + |ref| over all hinges between the world and the frame that have a
-        reference value `ref` other than 0.
+        The sum has a summand |q| + |ref| for each hinge between the world and the frame, if the reference
+        value `ref` of the hinge is not 0.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))

@@ -63,7 +63,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
 #: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: Limits (degrees) of a joint that hardly moves, whether its limits are in degrees or in radians.
+#: Largest limit (degrees) of a joint that hardly moves, whether its limits are in degrees or in radians.
 _SMALLEST_ANGLE = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a pointer file, which Git LFS has not yet replaced by the real file.
@@ -351,8 +351,7 @@ class _Edge:
         ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in these bodies.
         size: See `JointReading`.
-        rounded: Bounds on the effect of rounding to single precision: how far it moves (m) and rotates (rad)
-            the joint frame.
+        rounded: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
     """
 
     prim: Any
@@ -376,7 +375,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Read one stage. `source` is its name in messages; `opened` are the paths of expanded instances."""
+    """Read a stage. `source` is its name in messages, and `opened` are the paths of expanded instances."""
 
     pxr: Any
     stage: Any
@@ -626,8 +625,8 @@ class _StageReader:
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
         """Return the body with index `i` of a joint, and the joint frame; None if the target does not exist.
 
-        The result has four entries: the path of the body (None is the world); the pose of the joint frame in
-        the body (m); the `size` of this pose and the bounds `rounded`, see `_Edge`.
+        The result has four entries: the path of the body (None for the world), the pose of the joint frame in
+        the body (m), the number `size`, and the bounds `rounded` (see `_Edge`).
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")

@@ -7,27 +7,26 @@ import pytest
 
 import urdfkin
 from tests.urdf.lint.cases.left_out import CASES, Mjcf
-from urdfkin.urdf.lint.pages import OF_OTHERS, page
+from tests.urdfs import loaded
+from urdfkin.urdf.lint.pages import OF_OTHERS, explain, page
 
 OF_MJCF = [code for code in OF_OTHERS if code.startswith("MJCF")]
-OF_USD = [code for code in OF_OTHERS if code.startswith("USD")]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("code", OF_USD)
-def test_the_example_of_a_page_about_usd_has_the_finding_and_the_corrected_example_has_none(
-    code: str, tmp_path: Path
-) -> None:
-    pytest.importorskip("pxr")
-    found = {}
-    for which in ("example", "cure"):
-        file = tmp_path / f"{which}.usda"
-        file.write_text(getattr(page(code), which).lstrip())
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            robot = urdfkin.load(file, verify=False)
-        found[which] = [finding.code for finding in robot.findings if finding.code in OF_USD]
-    assert found == {"example": [code], "cure": []}
+@pytest.mark.parametrize("code", OF_OTHERS)
+def test_only_the_bad_example_on_a_page_about_mjcf_or_usd_has_the_finding(code: str, tmp_path: Path) -> None:
+    of_mjcf, rule = code in OF_MJCF, OF_OTHERS[code]
+    pytest.importorskip("mujoco" if of_mjcf else "pxr")
+    found = []
+    for text in (page(code).example, page(code).cure):
+        file = tmp_path / ("robot.xml" if of_mjcf else "robot.usda")
+        file.write_text(text.lstrip())
+        findings = loaded(file, verify=False).findings
+        codes = {code} if of_mjcf else OF_OTHERS.keys()
+        found.append({(one.code, one.severity) for one in findings if one.code in codes})
+    assert found == [{(code, rule.severity)}, set()]
+    assert explain(rule).startswith(f"{code} {rule.slug} ({rule.severity.value})")
 
 
 @pytest.mark.slow

@@ -284,8 +284,8 @@ class Choice:
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
     """Return the findings in an older version of a file. `look` checks the text of a file.
 
-    The result is None if no file has changed that affects the findings, because then the findings are the
-    same. If a mesh file was deleted after the older version, the finding about the missing mesh is new.
+    If no file that affects the findings has changed, the result is None, because no finding is new. If a mesh
+    file was deleted after the older version, the finding about the missing mesh is new.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
