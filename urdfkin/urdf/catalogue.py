@@ -105,19 +105,12 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
 
     with path.open("rb") as stream:
         table = tomllib.load(stream)
-    return {
-        name: Entry(
-            name=name,
-            family=row["family"],
-            relative_path=Path(row["path"]),
-            limbs={limb: (base, tip) for limb, (base, tip) in row.get("limbs", {}).items()},
-            mimic=row.get("mimic", True),
-            reason=row.get("reason"),
-            poses=row.get("poses", {}),
-            own=own,
-        )
-        for name, row in table.items()
-    }
+    entries = {}
+    for name, row in table.items():
+        limbs = {limb: (base, tip) for limb, (base, tip) in row.pop("limbs", {}).items()}
+        place = Path(row.pop("path"))
+        entries[name] = Entry(name=name, relative_path=place, limbs=limbs, own=own, **row)
+    return entries
 
 
 #: Environment variables with search paths.

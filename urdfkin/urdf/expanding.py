@@ -56,7 +56,7 @@ def _expand(
     import xacrodoc
 
     _replace_evaluation(path, search, ground)
-    importlib.import_module("xml.dom.expatbuilder")  # minidom would import this module later
+    importlib.import_module("xml.dom.expatbuilder")  # xacro cannot import this module after `confine`
     confine(ground.holds)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf = document.to_urdf_string()

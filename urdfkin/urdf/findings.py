@@ -147,7 +147,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """How Pinocchio deviates from the URDF specification: it refuses or misreads legal content."""
+    """Deviation of Pinocchio from the URDF specification: legal content is refused or read differently."""
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -381,7 +381,7 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """A comment that silences findings. `used` are those of its codes that have silenced a finding."""
+    """A comment that silences findings with the codes `codes`. The codes `used` have silenced a finding."""
 
     comment: Comment
     codes: tuple[str, ...]
@@ -485,7 +485,7 @@ class Reporter:
         attribute: str | None = None,
         found: str | None = None,
         remedy: str | None = None,
-        owner: str | None = None,
+        misplaced: bool = False,
         severity: Severity | None = None,
         position: tuple[int, int] = (1, 1),
         weight: float = 0.0,
@@ -495,8 +495,8 @@ class Reporter:
 
         - `at` is the element with the problem, and `attribute` the name of the wrong attribute.
         - `position` is the line and column of a finding without an element.
-        - `owner` is the tag of `at` if `at` is a link or joint in a wrong place. By default, the finding has
-          the name of the child of `<robot>` that contains `at`.
+        - The finding has the tag and the name of the child of `<robot>` that contains `at`. If `at` is
+          `misplaced`, the finding has the tag and the name of `at`.
         - `severity` replaces the severity of the rule.
         - `weight`: if findings with one code are combined, the finding with the greatest weight is reported.
         - `fix` returns the automatic fix, or None.
@@ -512,25 +512,15 @@ class Reporter:
                 kind.lines.append(position[0] if at is None else at.line)
             return
         line, column, width = (*position, 0) if position == (1, 1) else (*position, 1)
-        name = None
+        element, name = None, None
         if at is not None:
             line, column, width = self._place(at, attribute)
-            name = at.label if owner is None else at.attributes.get("name")
+            subject = at if misplaced else at.holder
+            element, name = subject.tag, subject.attributes.get("name") if at.parent is not None else None
         finding = Finding(
-            rule.id,
-            severity,
-            message,
-            found,
-            remedy,
-            self.file,
-            line,
-            column,
-            owner if owner or at is None else at.owner,
-            name,
-            rule.oracle,
-            width=width,
-            fix=None if fix is None or reason is not None else fix(),
-        )
+            rule.id, severity, message, found, remedy, self.file, line, column, element, name, rule.oracle,
+            width=width, fix=None if fix is None or reason is not None else fix(),
+        )  # fmt: skip
         if reason is None:
             kind.found.append((finding, weight))
         else:
@@ -616,7 +606,7 @@ class Reporter:
         existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         return (
-            Fix(tuple(Edit(_blanks_before(self.data, start), end) for start, end in spans)) if spans else None
+            Fix(tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)) if spans else None
         )
 
     def without_element(self, at: Element) -> Fix | None:
@@ -630,7 +620,7 @@ class Reporter:
             if (closed := closing.match(self.data, end)) is None:
                 return None
             end = closed.end()
-        start = _blanks_before(self.data, at.offset, b" \t")
+        start = blanks_before(self.data, at.offset, b" \t")
         rest = _REST_OF_LINE.match(self.data, end)
         alone = rest is not None and self.data[start - 1 : start] in (b"\n", b"\r")
         return Fix((Edit(start, rest.end()) if rest is not None and alone else Edit(at.offset, end),))
@@ -674,7 +664,7 @@ def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]
         yield match[1].decode(), _AttributeSpan(line, column, cursor, (match.start(2) + 1, match.end(2) - 1))
 
 
-def _blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
+def blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
     """Return the index of the first byte of the white space that ends at `start`."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1

@@ -61,7 +61,7 @@ def text_of(source: Any) -> tuple[str, str] | None:
 
 
 def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
-    """Return a finding if yourdfpy may have lost rotations of a robot. `file` is its name in messages.
+    """Return a finding if yourdfpy may have lost rotations. `file` is the robot's name in messages.
 
     yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text of the file. If a joint in
     the file has quat_xyzw, yourdfpy therefore loses the rotation of this joint.
@@ -200,7 +200,7 @@ class _ModelReader:
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
-        """Yield joints, each with a body whose frame is the joint's frame; the first such body comes last."""
+        """Yield each joint with a body whose frame is the joint's frame, in the reverse order of bodies."""
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i

@@ -133,8 +133,7 @@ class Mjcf:
     def lengths(self, q: FloatArray) -> FloatArray:
         """Return an upper bound (n, frames), in m, on each frame's distance from the world's origin.
 
-        The bound is the sum of the lengths of all translations from the world to the frame. It is a factor of
-        bounds on rounding errors.
+        The bound is the sum of the lengths of all translations from the world to the frame.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -152,8 +151,8 @@ class Mjcf:
     def reference_angles(self, q: FloatArray) -> FloatArray:
         """Return a sum of joint angles (n, frames), in rad, for bounds on rounding errors.
 
-        For each frame, the sum of |q| + |ref| over all hinges between the world and the frame that have a
-        reference value `ref` other than 0.
+        The sum has a summand |q| + |ref| for each hinge between the world and the frame, if the reference
+        value `ref` of the hinge is not 0.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -274,7 +273,10 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         spec = _spec(mujoco, source)
         aligned, fuses = list(_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
         if whole and fuses:
-            _refuse_fused(aligned, name)
+            if merged := [body for body in aligned if body.bodies]:
+                what = "MuJoCo fuses static bodies into a free body and aligns its frame with their inertia"
+                where, remedy = f"{name}: body {merged[0].name}", 'write fusestatic="false" or align="false"'
+                raise InputError(what, where=where, remedy=remedy)
             fused = compiled(_spec(mujoco, source))
         spec.compiler.fusestatic = False
         notes = list(_left_out(mujoco, spec))
@@ -325,16 +327,6 @@ def _moving_below(body: Any) -> bool:
     for one in descendants:
         descendants += one.bodies
     return any(list(one.joints) for one in descendants)
-
-
-def _refuse_fused(aligned: list[Any], name: str) -> None:
-    for body in aligned:
-        if body.bodies:
-            raise InputError(
-                "MuJoCo fuses static bodies into a free body and aligns its frame with their common inertia",
-                where=f"{name}: body {body.name}",
-                remedy='write fusestatic="false" or align="false"',
-            )
 
 
 def _align_note(body: str, *, whole: bool) -> Listed:

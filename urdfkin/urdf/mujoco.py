@@ -1,4 +1,4 @@
-"""Import MuJoCo on demand. No other module imports it."""
+"""Import MuJoCo on demand."""
 
 from __future__ import annotations
 

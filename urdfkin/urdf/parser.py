@@ -33,6 +33,7 @@ from urdfkin.urdf.findings import (
     Reporter,
     Rule,
     Severity,
+    blanks_before,
     quoted,
     shortened,
 )
@@ -194,13 +195,9 @@ def read_document(report: Reporter) -> Element | None:
     if text is None:
         return None
     report.data = text
-    return _parse(report)
-
-
-def _parse(report: Reporter) -> Element | None:
     builder = _Builder(report)
     try:
-        builder.read(report.data)
+        builder.read(text)
     except _StopError:
         return None
     except expat.ExpatError as error:
@@ -310,16 +307,11 @@ class _Builder:
     def comment(self, text: str) -> None:
         self.begun = True
         if text.lstrip().startswith(MARK):
-            comment = Comment(text, *self.position(), self._is_behind_something())
+            start = blanks_before(self.report.data, self.parser.CurrentByteIndex, b" \t")
+            behind = start > 0 and self.report.data[start - 1] not in b"\r\n"
+            comment = Comment(text, *self.position(), behind)
             self.report.comments.append(comment)
             self.waiting.append(comment)
-
-    def _is_behind_something(self) -> bool:
-        """Return whether the line has text other than white space before the parser's position."""
-        data, start = self.report.data, self.parser.CurrentByteIndex
-        while start > 0 and data[start - 1] in b" \t":
-            start -= 1
-        return start > 0 and data[start - 1] not in b"\r\n"
 
     def instruction(self, target: str, text: str) -> None:
         if self.begun:
@@ -657,7 +649,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def named(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint. If the name is missing, report this and return an empty string."""
+    """Return the name of a link or joint; report a missing name, and then return an empty string."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"

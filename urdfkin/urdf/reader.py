@@ -55,9 +55,8 @@ def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) ->
     """Return the link without a parent; raise InputError if there is none, or more than one."""
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
-        raise InputError(
-            "a robot must have one root link", where=name, found=", ".join(sorted(roots)) or "none"
-        )
+        found = ", ".join(sorted(roots)) or "none"
+        raise InputError("a robot must have one root link", where=name, found=found)
     return roots.pop()
 
 

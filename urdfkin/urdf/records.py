@@ -95,15 +95,6 @@ class Element:
         """The child of `<robot>` that contains this element, or the element itself."""
         return self.above or self
 
-    @property
-    def owner(self) -> str:
-        """The tag of `holder`, for example `joint` for an element inside a joint."""
-        return self.holder.tag
-
-    @property
-    def label(self) -> str | None:
-        return self.holder.attributes.get("name") if self.parent is not None else None
-
 
 Vector = tuple[float, ...]
 

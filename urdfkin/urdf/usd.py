@@ -63,7 +63,7 @@ _LARGEST = float(np.finfo(np.float32).max)
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
 #: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: Limits (degrees) of a joint that hardly moves, whether its limits are in degrees or in radians.
+#: Largest limit (degrees) of a joint that hardly moves, whether its limits are in degrees or in radians.
 _SMALLEST_ANGLE = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a pointer file, which Git LFS has not yet replaced by the real file.
@@ -351,8 +351,7 @@ class _Edge:
         ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in these bodies.
         size: See `JointReading`.
-        rounded: Bounds on the effect of rounding to single precision: how far it moves (m) and rotates (rad)
-            the joint frame.
+        rounded: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
     """
 
     prim: Any
@@ -376,7 +375,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Read one stage. `source` is its name in messages; `opened` are the paths of expanded instances."""
+    """Read a stage. `source` is its name in messages, and `opened` are the paths of expanded instances."""
 
     pxr: Any
     stage: Any
@@ -446,10 +445,8 @@ class _StageReader:
             joints = sum(one.IsA(physics.Joint) for one in below)
             if bodies or joints:
                 what = f"the prototypes of this PointInstancer have {bodies} bodies and {joints} joints"
-                self._report(
-                    "left-out-of-usd", path, f"{what}, which are not read",
-                    "write each copy as a prim of its own, with a reference",
-                )  # fmt: skip
+                remedy = "write each copy as a prim of its own, with a reference"
+                self._report("left-out-of-usd", path, f"{what}, which are not read", remedy)
             else:
                 self._report("unused-in-usd", path, "kinematics does not use this PointInstancer")
         return prims
@@ -478,11 +475,9 @@ class _StageReader:
         if kind == "time samples" and not attribute.GetNumTimeSamples():
             return
         if not attribute.GetResolveInfo(self.pxr.Usd.TimeCode.Default()).HasAuthoredValue():
-            self._report(
-                "time-samples", str(attribute.GetPrim().GetPath()),
-                f"{attribute.GetName()} has {kind}, but no default value, so {instead}",
-                "write a default value",
-            )  # fmt: skip
+            where = str(attribute.GetPrim().GetPath())
+            what = f"{attribute.GetName()} has {kind}, but no default value, so {instead}"
+            self._report("time-samples", where, what, "write a default value")
 
     def _report_timed_transforms(self, prim: Any) -> None:
         """Report transform operations without a default value, for a prim and all prims above it."""
@@ -630,8 +625,8 @@ class _StageReader:
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
         """Return the body with index `i` of a joint, and the joint frame; None if the target does not exist.
 
-        The result has four entries: the path of the body (None is the world); the pose of the joint frame in
-        the body (m); the `size` of this pose and the bounds `rounded`, see `_Edge`.
+        The result has four entries: the path of the body (None for the world), the pose of the joint frame in
+        the body (m), the number `size`, and the bounds `rounded` (see `_Edge`).
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
@@ -741,12 +736,10 @@ class _StageReader:
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
-            raise InputError(
-                "a limit of a joint is blocked, and OpenUSD's readers differ in its value",
-                where=f"{self.source}: joint {prim.GetPath()}",
-                found=f"{name} = None",
-                remedy="write a number; -inf and inf mean no limit",
-            )
+            message = "a limit of a joint is blocked, and OpenUSD's readers differ in its value"
+            where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
+            remedy = "write a number; -inf and inf mean no limit"
+            raise InputError(message, where=where, found=found, remedy=remedy)
         return float(self._value(prim, name))
 
     def _bounded(
@@ -1070,10 +1063,9 @@ class _StageReader:
             base, _, freedom = schema.partition(":")
             if base != "PhysxMimicJointAPI":
                 continue
-            leader = _target(prim, f"physxMimicJoint:{freedom}:referenceJoint")
-            gearing, offset = (
-                self._value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
-            )
+            prefix = f"physxMimicJoint:{freedom}"
+            leader = _target(prim, f"{prefix}:referenceJoint")
+            gearing, offset = self._value(prim, f"{prefix}:gearing"), self._value(prim, f"{prefix}:offset")
             multiplier = -1.0 if gearing is None else -float(gearing)
             self._compare_units(edge, leader)
             yield Mimic(leader, multiplier, -float(offset or 0.0) * own)

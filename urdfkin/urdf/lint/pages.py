@@ -40,9 +40,8 @@ OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 #: Code of each rule, by all names of the rule: the code in lower case, its digits, and the short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
-_TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
-    OF_OTHERS, "left_out"
-)
+_TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
+_TOPIC |= dict.fromkeys(OF_OTHERS, "left_out")
 
 
 @dataclass(frozen=True, slots=True)

@@ -113,7 +113,7 @@ def examine(
 ) -> Examined:
     """Check a text that `read_source` has returned, with the arguments of `check`.
 
-    `wanted` returns whether a finding is reported. It is called before findings are combined.
+    `wanted` is called before findings are combined, and returns whether a finding is reported.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic

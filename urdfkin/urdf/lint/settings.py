@@ -147,10 +147,9 @@ class Settings:
         return Path() if self.file is None else self.file.parent
 
     def ignored_in(self, file: str) -> frozenset[str]:
-        table = self.values.get("per-file-ignores", {}).items()
-        return codes(
-            word for pattern, words in table if matches(file, [pattern], self.root) for word in words
-        )
+        table = self.values.get("per-file-ignores", {})
+        patterns = [pattern for pattern in table if matches(file, [pattern], self.root)]
+        return codes(word for pattern in patterns for word in table[pattern])
 
 
 def find_settings(start: Path) -> Settings:
@@ -195,9 +194,9 @@ def _check_settings(file: Path, table: Any) -> Settings:
         if name not in _KINDS:
             raise UnknownNameError("setting", name, _KINDS, where=where)
         kind = _KINDS[name]
-        lists = (
-            [value] if kind is list else [*value.values()] if kind is dict and isinstance(value, dict) else []
-        )
+        lists = [value] if kind is list else []
+        if kind is dict and isinstance(value, dict):
+            lists = [*value.values()]
         if not isinstance(value, kind) or not all(_is_list_of_strings(each) for each in lists):
             raise InputError(f"{name} must be {_WORDS[kind]}", where=where, found=repr(value))
         if name in ("select", "ignore", "per-file-ignores"):
@@ -285,8 +284,8 @@ class Choice:
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
     """Return the findings in an older version of a file. `look` checks the text of a file.
 
-    The result is None if no file has changed that affects the findings, because then the findings are the
-    same. If a mesh file was deleted after the older version, the finding about the missing mesh is new.
+    If no file that affects the findings has changed, the result is None, because no finding is new. If a mesh
+    file was deleted after the older version, the finding about the missing mesh is new.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:

@@ -21,7 +21,7 @@ HEAVIEST, FARTHEST = 1e9, 1e6
 #: Mass (kg) below which moments of inertia are not checked, because the mass is probably a placeholder.
 NEGLIGIBLE = 1e-3
 
-#: Moment of inertia per kg (m^2) that counts as a rounding error.
+#: Largest moment of inertia per kg (m^2) that is treated as a rounding error.
 #: Only bodies smaller than about 0.03 mm have such small moments.
 ROUNDING = 1e-9
 

@@ -101,9 +101,9 @@ def _report_xacro(
     """Report unexpanded xacro; return whether kinematics uses one of the elements (an error)."""
     used = [place for place in places if is_used(place[0])]
     unused = [place for place in places if not is_used(place[0])]
-    for group, severity, harmless in (
-        (used, None, ""),
-        (unused, Severity.WARNING, "; kinematics does not use it"),
+    for group, severity, message in (
+        (used, None, f"unexpanded {what}"),
+        (unused, Severity.WARNING, f"unexpanded {what}, which kinematics does not use"),
     ):
         if not group:
             continue
@@ -111,15 +111,8 @@ def _report_xacro(
         found = f"<{shortened(element.tag)}>"
         if key is not None:
             found = f"{shortened(key)}={quoted(element.attributes[key])}"
-        report.add(
-            XACRO,
-            f"unexpanded {what}{harmless}",
-            element,
-            attribute=key,
-            found=found + _more(group),
-            remedy=_EXPAND,
-            severity=severity,
-        )
+        found += _more(group)
+        report.add(XACRO, message, element, attribute=key, found=found, remedy=_EXPAND, severity=severity)
     return bool(used)
 
 
@@ -231,7 +224,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
             what = f"a {meant} inside <{part.parent.tag if part.parent else ''}>"
         message = f"{what} is skipped, so the element is missing from the robot"
         remedy = f"write <{meant}> as a child of <robot>"
-        report.add(MISPLACED, message, part, remedy=remedy, owner=part.tag)
+        report.add(MISPLACED, message, part, remedy=remedy, misplaced=True)
     if parts:
         return
     close = None if report.is_full(UNKNOWN_ELEMENT) else nearest_tag(element.tag, known)

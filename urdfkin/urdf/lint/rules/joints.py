@@ -106,9 +106,8 @@ def _joints_by_parent(joints: Iterable[JointRecord]) -> dict[str, list[JointReco
 def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | None, *, loop: bool) -> None:
     if loop:
         rule, remedy = CYCLE, "remove a joint of the loop; a URDF is a tree"
-        message = (
-            f"the joint closes a loop: its child is an ancestor of its parent {quoted(joint.parent or '')}"
-        )
+        parent = quoted(joint.parent or "")
+        message = f"the joint closes a loop: its child is an ancestor of its parent {parent}"
     else:
         other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
         rule, remedy = SEVERAL_PARENTS, "a link has one parent; remove one of the joints"
@@ -378,17 +377,12 @@ class _MimicChecker:
 
     def check(self, joint: JointRecord, mimic: MimicRecord) -> None:
         if joint.kind == "fixed":
-            self.add(
-                parser.IGNORED,
-                "a fixed joint cannot mimic; its <mimic> is ignored",
-                mimic,
-                "joint",
-                "remove <mimic>",
-                lambda: self.report.without_element(mimic.element),
-            )
+            message, remedy = "a fixed joint cannot mimic; <mimic> is ignored", "remove <mimic>"
+            fix = partial(self.report.without_element, mimic.element)
+            self.add(parser.IGNORED, message, mimic, "joint", remedy, fix)
             return
         if joint.kind in ("planar", "floating"):
-            message = f"a {joint.kind} joint cannot mimic another: it has several coordinates"
+            message = f"a {joint.kind} joint has several coordinates and cannot mimic another joint"
             self.add(MIMIC_LEADER, message, mimic, "joint", "remove <mimic>")
             return
         leader = self.joints.get(mimic.leader)
@@ -414,33 +408,20 @@ class _MimicChecker:
 
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
         if mimic.multiplier == 0.0:
-            self.add(
-                MIMIC_CONSTANT,
-                f"the multiplier is zero: the joint stays at {mimic.offset:g}",
-                mimic,
-                "multiplier",
-                "write the ratio, or make the joint fixed",
-            )
+            message = f"the multiplier is zero: the joint stays at {mimic.offset:g}"
+            remedy = "write the ratio, or make the joint fixed"
+            self.add(MIMIC_CONSTANT, message, mimic, "multiplier", remedy)
         for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
             if abs(value) > LARGEST:
                 message = f"the {attribute} is far too large"
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
-            self.add(
-                MIMIC_CONTINUOUS,
-                "a continuous joint mimics another: Pinocchio accepts this only if both are continuous",
-                mimic,
-                "joint",
-                'write type="revolute" for the mimic joint',
-            )
+            message = "Pinocchio accepts a continuous mimic joint only if the mimicked joint is continuous"
+            self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if leader.mimic is not None:
-            self.add(
-                MIMIC_CHAIN,
-                f"the mimicked joint itself mimics {leader.mimic.leader!r}",
-                mimic,
-                "joint",
-                "name the last joint of the chain: some readers resolve one step only",
-            )
+            message = f"the mimicked joint itself mimics {leader.mimic.leader!r}"
+            remedy = "name the last joint of the chain, because some readers apply only the last rule"
+            self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= LARGEST:
             self.check_range(joint, mimic, joint.limit)
 
@@ -454,9 +435,8 @@ class _MimicChecker:
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
         low, high = allowed_range(rule, Limit(*limits, math.inf, math.inf), *moving)
-        if low <= high and (
-            rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0])
-        ):
+        least = 0.0 if rule.multiplier == 0.0 else (1.0 - LEAST_LOST) * (moving[1] - moving[0])
+        if low <= high and high - low >= least:
             return
         allowed = f"only {range_words((low, high))}" if low < high else "no value"
         message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
