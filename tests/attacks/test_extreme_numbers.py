@@ -22,7 +22,7 @@ from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.bounds import magnitudes
@@ -79,11 +79,8 @@ def test_numbers_of_any_size_are_verified_or_leave_the_range(
     q = robot.sample(1, seed % 1000)[0]
     q[LENGTHS] = numbers(rng, sizes[0], len(LENGTHS))
     v, a = numbers(rng, sizes[1], robot.nv), numbers(rng, sizes[2], robot.nv)
-    base = None
-    if moving:
-        T = np.eye(4)
-        T[:3, 3] = numbers(rng, sizes[3], 3)
-        base = BaseMotion(T, numbers(rng, sizes[4], 6), numbers(rng, sizes[5], 6))
+    fields = pose(p=numbers(rng, sizes[3], 3)), numbers(rng, sizes[4], 6), numbers(rng, sizes[5], 6)
+    base = BaseMotion(*fields) if moving else None
     beyond = everything(robot, q, v, a, base)
     used = sizes if moving else sizes[:3]
     if max(used) < 75:  # no product of three or four of them overflows
@@ -124,7 +121,7 @@ def test_a_place_whose_square_overflows_is_verified(size: float) -> None:
     robot = urdfkin.load(PLANAR)
     assert np.isfinite(robot.placement([size, 0.0, 0.7], "b")).all()
     assert np.isfinite(robot.velocity([size, 0.0, 0.7], [size, 1.0, 0.0], "b")).all()
-    base = BaseMotion(np.block([[np.eye(3), np.full((3, 1), size / 2)], [np.zeros(3), 1.0]]))
+    base = BaseMotion(pose(p=np.full(3, size / 2)))
     assert np.isfinite(robot.placement([0.0, 0.0, 0.7], "b", base=base)).all()
     assert robot.certificate().verified
 
@@ -298,9 +295,7 @@ def test_the_limit_is_where_nothing_can_overflow_below_it() -> None:
 
 
 def base_at(distance: float, rates: FloatArray) -> BaseMotion:
-    T = np.eye(4)
-    T[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
-    T[:3, 3] = distance * np.array([0.5, 4.5, 1e-4])
+    T = pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], distance * np.array([0.5, 4.5, 1e-4]))
     return BaseMotion(T, rates[:6], rates[6:])
 
 

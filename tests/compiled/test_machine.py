@@ -185,18 +185,11 @@ def sine_and_cosine(angles: FloatArray) -> FloatArray:
 
 
 def units_off(angles: FloatArray) -> FloatArray:
+    number = np.vectorize(lambda x: mpmath.mpf(float(x)), otypes=[object])
     with mpmath.workdps(60):
-        true = [[f(mpmath.mpf(float(x))) for f in (mpmath.sin, mpmath.cos)] for x in angles]
-        ours = sine_and_cosine(angles)
-        return np.array(
-            [
-                [
-                    float((mpmath.mpf(float(x)) - y) / np.spacing(abs(float(y))))
-                    for x, y in zip(*pair, strict=True)
-                ]
-                for pair in zip(ours, true, strict=True)
-            ]
-        )
+        true = np.array([[f(x) for f in (mpmath.sin, mpmath.cos)] for x in number(angles)])
+        off: FloatArray = (number(sine_and_cosine(angles)) - true).astype(np.float64)
+    return off / np.spacing(np.abs(true.astype(np.float64)))
 
 
 @pytest.mark.slow

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import copy
 import ctypes
-import os
 import pickle
-import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -18,6 +16,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import python
 from tests.laws.everything import differing
 from tests.laws.subjects import robot_of, state
 from urdfkin import Reference
@@ -278,11 +277,7 @@ def test_it_goes_to_another_process(tmp_path: Any) -> None:
         "import pickle, sys; fast, q, J = pickle.load(open(sys.argv[1], 'rb'));"
         "assert (fast.jacobian(q) == J).all()"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(tmp_path / "fast")],
-        capture_output=True, text=True, check=False, env=os.environ,
-    )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "")
+    assert python(program, str(tmp_path / "fast")).stderr == ""
 
 
 def test_functions_take_their_own_number_of_arguments_and_no_other(panda: Robot) -> None:

@@ -26,7 +26,7 @@ from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.bounds import magnitudes
@@ -124,9 +124,7 @@ def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: str) -> None:
 @pytest.mark.parametrize("name", ["panda", "a1"])
 def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> None:
     locked = robot_of(name).locked(joints=lockable(robot_of(name))[:2], lock="ready")
-    T = np.eye(4)
-    T[:3, 3] = 1.0, 2.0, 3.0
-    base = urdfkin.BaseMotion(T, np.array([1.0, 0, 0, 0, 0, 2.0]), np.array([0, 1.0, 0, 3.0, 0, 0]))
+    base = urdfkin.BaseMotion(pose(p=[1.0, 2.0, 3.0]), [1.0, 0, 0, 0, 0, 2.0], [0, 1.0, 0, 3.0, 0, 0])
     q, v, a = state(locked, 2, 4)
     locked.acceleration(q, v, a, locked.link_frames, base=base, verify=True)
     assert locked.certificate().verified

@@ -28,6 +28,7 @@ from urdfkin.kinematics.bodies import (
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import euler_of, euler_rate_matrix, exp_rotation, rotation_about
 from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.tree import pose as pose_of
 
 MOVING = motion("elbow", 7)
 R_06 = MOVING.rotation(6)
@@ -241,9 +242,7 @@ def test_a_moving_base_supplies_the_initial_conditions() -> None:
     generator = np.random.default_rng(11)
     R, p = exp_rotation([0.3, -0.4, 0.5]), np.array([0.2, 0.1, 0.7])
     w, vel, alpha, acc = generator.normal(size=(4, 3))
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, p
-    base = BaseMotion(T, np.concatenate((vel, w)), np.concatenate((acc, alpha)))
+    base = BaseMotion(pose_of(R, p), np.concatenate((vel, w)), np.concatenate((acc, alpha)))
     d, d_rate, d_rate_rate = (R @ x for x in (POLAR.origin(2), POLAR.vel(2), POLAR.acc(2)))
     expected = (
         acc + np.cross(alpha, d) + np.cross(w, np.cross(w, d)) + 2.0 * np.cross(w, d_rate) + d_rate_rate

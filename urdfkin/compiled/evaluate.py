@@ -245,8 +245,8 @@ def _compiled(
 def is_staged(out: FloatArray) -> bool:
     """Return whether results are collected in a buffer and then written to memory in whole cache lines.
 
-    A processor that writes a part of a cache line reads the whole line first. If the output is larger than
-    the cache, this read is slow.
+    A processor that writes a part of a cache line reads the whole line first. Reading is slow if the output
+    is larger than the cache.
     """
     return out.nbytes >= _STREAMED and LANES * out[0].size <= _MOST_STAGED
 
@@ -341,8 +341,8 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
-    `compute` computes the rows of a slice. For an empty batch, it is called once, with an empty slice.
-    `threads` has the same meaning as in `in_blocks`.
+    `compute` computes the rows of a slice; for an empty batch, its only slice is empty. `threads` has the
+    same meaning as in `in_blocks`.
     """
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]

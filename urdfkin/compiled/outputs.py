@@ -141,10 +141,7 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
 
 
 def column_rate(s, row, to, how, g, c, reference, state):
-    """Compute the time derivative of a Jacobian column (7.126).
-
-    For the reference frame LOCAL, this is the derivative of the column's components in the frame's own axes.
-    """
+    """Compute the time derivative of a Jacobian column (7.126), for LOCAL in the frame's moving axes."""
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = vector(s, row)
     z_rate = eq.axis_rate(vector(s, row + 6), z)
@@ -164,7 +161,7 @@ def column_rate(s, row, to, how, g, c, reference, state):
 
 
 def _end(reference, x):
-    """Return a Jacobian column's reference point: the frame's origin x, or for WORLD the world's origin."""
+    """Return the reference point of a Jacobian column: the frame's origin x, or 0 for WORLD."""
     if reference == _WORLD:
         nil = same(0.0)
         x = nil, nil, nil

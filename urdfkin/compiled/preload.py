@@ -132,10 +132,10 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Start a second process that compiles a kernel, and return whether such a process runs.
+    """Start a second process that compiles a kernel, and return whether a second process runs.
 
-    At most one such process runs at a time, and it is started at most once for each kernel. The function also
-    returns True while the second process compiles another kernel.
+    At most one second process runs at a time, and each kernel gets at most one. If the second process
+    compiles another kernel, the function also returns True.
     """
     if cache_folder() is None:
         return False
@@ -177,7 +177,7 @@ def _close(process: subprocess.Popen[bytes]) -> None:
 
 
 def _forget_beside() -> None:
-    """Close the second process's standard input in a forked child, which must not keep it open."""
+    """Close the second process's standard input in a forked child, so that only the parent keeps it open."""
     for process in _beside.values():
         process.returncode = 0
         _close(process)
@@ -197,10 +197,10 @@ def are_on_disk() -> bool:
 
 
 def load_kernels() -> None:
-    """Compile every kernel, or read it from disk, before several processes need the kernels.
+    """Load every kernel before several processes start, because each of them would compile it.
 
-    Otherwise each of them would compile the kernels. A process compiles on one processor only, so a second
-    process compiles half of the kernels, and this process reads them from disk.
+    A process compiles on one processor only, so a second process compiles half of the kernels, and this
+    process reads them from disk.
     """
     missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
     helper = _compile_elsewhere(_OTHER_HALF) if missing else None

@@ -119,7 +119,7 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return the state of a link after the axes of its frame are rotated by S; its motion does not change."""
+    """Return the state of a link after only the axes of the link's frame are rotated by S."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),

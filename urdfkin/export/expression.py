@@ -92,7 +92,7 @@ class Graph:
     def __init__(self) -> None:
         self._made: dict[tuple[Any, ...], Node] = {}
         self.place, self.equation = 0, ""
-        self.chapter: Any = bound(made=self._record_numbers)
+        self.chapter: Any = bound(decorate=self._record_numbers)
 
     def input(self, letter: str, place: int) -> Node:
         return self.made(letter, place)

@@ -104,7 +104,7 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
     """Return the motion of the last frame relative to frame 0 (7.50, 7.61).
 
-    Entry i is the motion of frame i + 1 relative to frame i. Without frames, the result is no motion.
+    Entry i of `frames` is the motion of frame i + 1 relative to frame i. Without frames, nothing moves.
     """
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
 
@@ -254,9 +254,7 @@ def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
 
 
 def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link that turns about O_0 (7.1, 7.3).
-
-    The link has the length a, `length`.
+    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link of length a that turns about O_0 (7.1, 7.3).
 
     >>> link_endpoint(np.pi / 2, 2.0).round(12)
     array([0., 2.])

@@ -194,8 +194,8 @@ _LENGTHS = {
     **dict.fromkeys(("times", "dot", "cross"), _product),
 }
 _EQUATIONS: Any = ModuleType("length_equations")  # Numba finds the functions of a module
-vars(_EQUATIONS).update(vars(bound(made=helper(), **_LENGTHS)))
-_STEPS = rebound(steps, made=helper(), others={"eq": _EQUATIONS})
+vars(_EQUATIONS).update(vars(bound(decorate=helper(), **_LENGTHS)))
+_STEPS = rebound(steps, decorate=helper(), others={"eq": _EQUATIONS})
 _carried, _turned, _slid, _freed = (_STEPS[name] for name in ("carried", "turned", "slid", "freed"))
 
 

@@ -241,15 +241,15 @@ class Kernel:
         dispatcher.disable_compile()
         return dispatcher
 
-    def _compile_or_load(self, made: Any, make: Callable[[], object]) -> None:
+    def _compile_or_load(self, function: Any, compile_: Callable[[], object]) -> None:
         """Read the function from disk, or compile it and inform the listeners."""
         with compile_event(self.__name__.strip("_").replace("_", " ")) as begin, compiling_allowed():
             _skip_blas_check()
             if (folder := cache_folder()) is None:
                 begin()
             else:
-                made._cache = KernelCache(self._function, folder, begin)
-            make()
+                function._cache = KernelCache(self._function, folder, begin)
+            compile_()
 
     def __call__(self, *arguments: Any) -> int:
         return int(self.compiled(*arguments))
@@ -287,6 +287,6 @@ def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]]
     """Return a decorator for a kernel with these argument types (Numba's).
 
     The kernel is compiled at the first call and cached on disk. `nogil` says whether a call releases Python's
-    global interpreter lock. For a call that takes a microsecond, this would cost more time than it saves.
+    global interpreter lock. Releasing the lock costs more time than a call of a microsecond takes.
     """
     return lambda function: Kernel(function, arguments, nogil)

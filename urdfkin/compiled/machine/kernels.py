@@ -18,8 +18,8 @@ from urdfkin.kinematics.arithmetic import rebound
 _OTHERS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}
-_INLINED: dict[str, Any] = rebound(recursion, outputs, made=compiled, others=_OTHERS)
-_KERNELS: dict[str, Core] = rebound(recursions, made=Core, others=_INLINED)
+_INLINED: dict[str, Any] = rebound(recursion, outputs, decorate=compiled, others=_OTHERS)
+_KERNELS: dict[str, Core] = rebound(recursions, decorate=Core, others=_INLINED)
 
 placements, velocities, accelerations = (
     _KERNELS[name] for name in ("placements", "velocities", "accelerations")

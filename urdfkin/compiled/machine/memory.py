@@ -40,8 +40,6 @@ def _in_row(builder: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number(context: Any, s: Any, row: Any) -> Any:
-    """Return the eight doubles of a row of scratch memory as one vector."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.load(_in_row(builder, *arguments), align=64)
 
@@ -50,8 +48,6 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the eight doubles of a row of scratch memory, or `nothing()` if `wanted` is `nothing()`."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if isinstance(wanted, Known):
             return context.get_dummy_value()
@@ -62,8 +58,6 @@ def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def put(context: Any, s: Any, row: Any, x: Any) -> Any:
-    """Write the eight doubles of x to a row of scratch memory; `nothing()` leaves the row as it is."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         s, row, value = arguments
         if x != NOTHING:
@@ -76,8 +70,6 @@ def put(context: Any, s: Any, row: Any, x: Any) -> Any:
 
 @intrinsic
 def constant(context: Any, g: Any, i: Any) -> Any:
-    """Return element i of the constants g as a number with the same value for all configurations."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, builder.load(builder.gep(arguments[0], [arguments[1]])), LANES)
 
@@ -86,8 +78,6 @@ def constant(context: Any, g: Any, i: Any) -> Any:
 
 @intrinsic
 def same(context: Any, x: Any) -> Any:
-    """Return a vector in which the double x is repeated for all eight configurations."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, arguments[0], LANES)
 
@@ -339,7 +329,6 @@ def _sum(context: Any, x: Any) -> Any:
 
 @compiled
 def ordinary(total):
-    """Return whether a sum of squares is below the square of `LARGE`; it is not if a number was nan."""
     return _sum(total) < LARGE * LARGE
 
 
@@ -361,8 +350,8 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
-    Before it writes a part of a cache line, a processor reads this line. If all bytes of a cache line are
-    written at once, the processor does not read the line first. `address` is the address of `to[0]`.
+    A processor reads a cache line before it writes a part of the line, but not before it writes the whole
+    line. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

@@ -89,9 +89,9 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 
 @compiled
-def _doubles_address(given, ndarray, flags, axes, rows, columns):
+def _doubles_address(array, ndarray, flags, axes, rows, columns):
     """Return the address of an array's doubles; 0 if the object has another type, shape or flags."""
-    x = whole_numbers_at(given)
+    x = whole_numbers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
         return 0
     kind, shape = whole_numbers_at(x[_KIND])[_KIND_AND_ORDER], whole_numbers_at(x[_SHAPE])
@@ -118,16 +118,16 @@ def one_configuration(bound, arguments, count):
         arguments: Address of the Python call's arguments.
         count: Number of these arguments.
     """
-    items, given = whole_numbers_at(bound), whole_numbers_at(arguments)
+    items, inputs = whole_numbers_at(bound), whole_numbers_at(arguments)
     address, ndarray, none = whole_numbers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
     orders = whole_numbers_at(address)[_ORDERS]
     if count == orders + 1:
-        out = given[orders]
+        out = inputs[orders]
         if out == none:
             out = _call_one_arg(items[_ITEMS + 3], items[_ITEMS + 4])
         else:
             _incref(out)
-        if out == 0 or _compute_into(address, given, out, ndarray):
+        if out == 0 or _compute_into(address, inputs, out, ndarray):
             return out
         _decref(out)
     _incref(none)
@@ -135,7 +135,7 @@ def one_configuration(bound, arguments, count):
 
 
 @compiled
-def _compute_into(address, given, to, ndarray):
+def _compute_into(address, inputs, to, ndarray):
     """Write the kernel's result into the array `to`; return whether the type and the shape of `to` fit."""
     task = whole_numbers_at(address)
     orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
@@ -145,13 +145,13 @@ def _compute_into(address, given, to, ndarray):
     for _ in range(1, task[_AXES]):
         size *= columns
     for i in range(orders):
-        x = _doubles_address(given[i], ndarray, _READABLE, 1, width, 1) if good else 0
+        x = _doubles_address(inputs[i], ndarray, _READABLE, 1, width, 1) if good else 0
         apart = x + 8 * width <= out or out + size <= x
         good, width = x != 0 and apart, task[_NV]
     if not good or _test_and_set(task, _BUSY):
         return False
     for i in range(orders):
-        task[_Q + i] = whole_numbers_at(given[i])[_DATA]
+        task[_Q + i] = whole_numbers_at(inputs[i])[_DATA]
     task[_OUT] = out
     good = _call(task[_CORE], address) == 0
     task[_COUNT] += good

@@ -112,12 +112,12 @@ class Conversion:
         tree, how = self.tree, self.convention
         moving = {i for i, joint in enumerate(tree.joints) if joint.kind.nv}
         if how.order == "given":
-            return self._given(moving)
+            return self._listed_order(moving)
         if how.mimic == "none":
             moving -= {i for i in moving if tree.joints[i].mimic}
         return [i for i in self._all_in_order() if i in moving]
 
-    def _given(self, moving: set[int]) -> list[int]:
+    def _listed_order(self, moving: set[int]) -> list[int]:
         how = self.convention
         if not how.joints:
             raise InputError(
@@ -415,10 +415,10 @@ class Conversion:
             ours.append(self._from_rates(ours[0], self._theirs(a, "a"), ours[1]))
         return ours[0] if len(ours) == 1 else tuple(ours)
 
-    def _ours(self, *given: Given | None) -> list[FloatArray]:
-        if given[1] is None and given[2] is not None:
+    def _ours(self, *values: Given | None) -> list[FloatArray]:
+        if values[1] is None and values[2] is not None:
             raise InputError("`a` can only be converted together with `v`")
-        letters = zip("qva", given, strict=True)
+        letters = zip("qva", values, strict=True)
         return [configuration.checked(self.tree, x, letter) for letter, x in letters if x is not None]
 
     def _theirs(self, value: ArrayLike, what: str) -> FloatArray:
