@@ -4,7 +4,6 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ import pytest
 import urdfkin
 from tests.cli.running import good
 from tests.cli.running import urdfkin as command
+from tests.dh.arms import CONVENTIONS, with_cells
 from urdfkin.dh import DHTable, dh_table, read_table, units_of
 from urdfkin.dh.compare import compare, document
 from urdfkin.dh.convert import to_tree
@@ -33,15 +33,9 @@ def with_ends(name: str) -> tuple[urdfkin.Robot, str, str]:
     return (robot, "base", "tool0") if name == "ur5" else (robot, robot.base_frame, robot.tip_frame)
 
 
-def with_cell(table: DHTable, row: int, **cells: Any) -> DHTable:
-    rows = list(table.rows)
-    rows[row] = replace(rows[row], **cells)
-    return replace(table, rows=tuple(rows))
-
-
 def wrong_d1() -> DHTable:
     table = read_table(reference_path("ur5"))
-    return with_cell(table, 0, d=table.rows[0].d + 0.01)
+    return with_cells(table, 0, d=table.rows[0].d + 0.01)
 
 
 def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
@@ -65,7 +59,7 @@ def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
     assert found.residual <= 1e-12
 
 
-@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize(
     ("row", "cell"), [(0, "d"), (0, "theta"), (2, "theta"), (3, "d"), (1, "a"), (5, "d")]
 )
@@ -73,7 +67,7 @@ def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cel
     path = ur5()
     table = dh_table(urdfkin.load("ur5").tree, "tool0", "base", convention, snap=1e-6)
     assert compare(path, table, fit=False).agrees
-    wrong = with_cell(table, row, **{cell: getattr(table.rows[row], cell) + 3e-3})
+    wrong = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 3e-3})
     found = compare(path, wrong, fit=False)
     assert not found.agrees
     assert found.metres > 1e-3 or found.radians > 1e-3

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.cli.test_dh import run
-from tests.dh.arms import with_cell
+from tests.dh.arms import with_cells
 from urdfkin.dh import DHTable, read_table, table_from_rows, units_of
 from urdfkin.dh.compare import TableComparison, compare, document
 from urdfkin.dh.convert import to_tree
@@ -37,7 +37,7 @@ def with_wrong_signs(table: DHTable) -> Iterator[tuple[int, str, DHTable]]:
         for cell in ("a", "alpha", "d", "theta"):
             value = getattr(row, cell)
             if abs(value if cell in ("a", "d") else math.sin(value)) > 1e-9:
-                yield i, cell, with_cell(table, i, cell, -value)
+                yield i, cell, with_cells(table, i, **{cell: -value})
 
 
 def named(found: TableComparison) -> list[tuple[int, str, float]]:
@@ -62,7 +62,7 @@ def test_an_alpha_with_a_right_angle_too_many_is_named_alone(name: str) -> None:
     path, table = shipped(name)
     for row in range(len(table.rows)):
         alpha = table.rows[row].alpha
-        found = compare(path, with_cell(table, row, "alpha", alpha + math.pi / 2))
+        found = compare(path, with_cells(table, row, alpha=alpha + math.pi / 2))
         assert [one[:2] for one in named(found)] == [(row, "alpha")]
         assert named(found)[0][2] == pytest.approx(alpha, abs=1e-15)
         assert not found.passes
@@ -113,7 +113,7 @@ def test_a_table_on_other_frames_says_that_a_wrong_sign_can_hide() -> None:
 def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
     rows = [[0.1, 0.5, 0.3, 0.0], [0.2, 0.0, 0.05, 0.0], [0.15, 0.9, 0.05, 0.0], [0.1, 0.4, 0.1, 0.0]]
     wrong = table_from_rows(rows, "standard")
-    right = with_cell(wrong, 1, "d", -0.05)  # along parallel axes only the sum of the offsets shows
+    right = with_cells(wrong, 1, d=-0.05)  # along parallel axes only the sum of the offsets shows
     found = compare(chain(to_tree(right), right.tip_frame, right.base_frame), wrong)
     assert [one[:2] for one in named(found)] == [(1, "d"), (2, "d")]
     assert found.differences == ()
@@ -123,8 +123,8 @@ def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
 def test_a_wrong_sign_is_named_beside_a_difference_that_is_smaller() -> None:
     """A calibrated robot is off by a millimetre; the sign of a sheet is off by a hundred."""
     path, table = shipped("panda")
-    near = with_cell(table, 6, "a", table.rows[6].a + 1e-3)
-    found = compare(path, with_cell(near, 3, "a", -near.rows[3].a))
+    near = with_cells(table, 6, a=table.rows[6].a + 1e-3)
+    found = compare(path, with_cells(near, 3, a=-near.rows[3].a))
     assert not found.agrees
     assert [one[:2] for one in named(found)] == [(3, "a")]
     assert 5e-4 < found.mistakes[0].metres < 2e-3

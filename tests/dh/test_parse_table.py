@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.cli.test_dh import run
+from tests.dh.arms import CONVENTIONS
 from tests.random_chains import trees
 from urdfkin.dh import (
     dh_table,
@@ -43,7 +44,7 @@ ROWS = [[0.0, "pi/2", 0.3, 0.0, "R"], [0.4, 0.0, 0.0, -1.0, "P"]]
 
 
 @pytest.mark.slow
-@given(trees(), st.sampled_from(["standard", "modified"]), st.sampled_from(["toml", "json", "csv"]))
+@given(trees(), st.sampled_from(CONVENTIONS), st.sampled_from(["toml", "json", "csv"]))
 @settings(max_examples=50)
 def test_a_written_table_reads_back_to_the_bit(tree: KinematicTree, convention: str, form: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
