@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 
 from tests.random_chains import rotation, shift, z_joint
-from urdfkin.dh import DHTable
+from urdfkin.dh import DHTable, read_table
+from urdfkin.dh.parse_table import reference_path
+from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, build_tree
+from urdfkin.robot.loading import load
 
 EPS = float(np.finfo(np.float64).eps)
 CONVENTIONS = ("standard", "modified")
@@ -65,6 +68,12 @@ def disguised(table: DHTable, seed: int) -> DHTable:
         d = z * row.d + (0.0 if row.kind.turns else rng.uniform(-1, 1))
         rows.append(replace(row, a=a, alpha=alpha, beta=beta, d=d, theta=theta))
     return replace(table, rows=tuple(rows), base=np.eye(4), tool=np.eye(4))
+
+
+def published(name: str) -> tuple[FrameChain, DHTable]:
+    """The path of a robot and its published table."""
+    table = read_table(reference_path(name))
+    return load(table.robot).chain(table.tip_frame, table.base_frame), table
 
 
 def error_ratio(

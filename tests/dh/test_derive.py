@@ -33,7 +33,7 @@ def reach_of(path: FrameChain) -> float:
 
 
 def demand_exact(table: DHTable, path: FrameChain) -> None:
-    """The table places the tip as the path does, within its tolerance and the rounding of the path's product."""
+    """The table places the tip as the path does, up to rounding."""
     q = configurations(len(path.joint_names))
     slack = 4 * EPS * (1 + sum(path.folded)) * reach_of(path)
     assert error_ratio(table, table.placement(q), path.placement(q), q, slack) <= 2.0

@@ -132,11 +132,11 @@ def _table(
         a, alpha = first or (0.0, 0.0)
         steps = [AxisTransform(a=a, alpha=alpha), *steps[:-1]]
     rows = []
-    for joint, (theta, d), step in zip(chain.joints, theta_and_d, steps, strict=True):
+    for joint, (own_theta, own_d), step in zip(chain.joints, theta_and_d, steps, strict=True):
         # The sum with 0.0 makes a negative zero positive.
-        *cells, beta = (x + 0.0 for x in (step.a, step.alpha, d, theta, step.beta))
+        a, alpha, d, theta, beta = (x + 0.0 for x in (step.a, step.alpha, own_d, own_theta, step.beta))
         sense = -1 if joint.name in choices.flip else 1
-        rows.append(DHRow(*cells, joint.kind, joint.name, sense, beta, joint.mimic, joint.limit))
+        rows.append(DHRow(a, alpha, d, theta, joint.kind, joint.name, sense, beta, joint.mimic, joint.limit))
     return DHTable(choices.convention, tuple(rows), base, tool, chain.robot, chain.base, chain.tip)
 
 

@@ -556,7 +556,7 @@ class DHTable(Displayable):
         Example:
             >>> import math
             >>> from urdfkin.model.tree import JointKind
-            >>> arm = DHTable(Convention.STANDARD, (DHRow(2.0, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "j"),))
+            >>> arm = DHTable(DHConvention.STANDARD, (DHRow(2.0, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "j"),))
             >>> arm.placement([math.pi / 2])[:3, 3].round(12).tolist()
             [0.0, 2.0, 0.0]
         """
