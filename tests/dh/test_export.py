@@ -62,7 +62,7 @@ def check(
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("form", ["numpy", "c", "matlab", "sympy", "casadi"])
 def test_code_computes_what_pinocchio_computes(form: str, name: str, convention: str, tmp_path: Path) -> None:
-    check(form, TREES[name](), convention, tmp_path, **({"flip": ["j2", "j3"]} if name == "plain" else {}))
+    check(form, TREES[name](), convention, tmp_path, flip=["j2", "j3"] if name == "plain" else [])
 
 
 @pytest.mark.slow
