@@ -4,7 +4,6 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,20 +11,17 @@ import pytest
 import urdfkin
 from tests.cli.running import good
 from tests.cli.running import urdfkin as command
-from urdfkin.dh import DHTable, dh_table, read_table, units_of
+from tests.dh.arms import CONVENTIONS, published, with_cells
+from urdfkin.dh import dh_table, units_of
 from urdfkin.dh.compare import compare, document
 from urdfkin.dh.convert import to_tree
 from urdfkin.dh.parse_table import read_mapping, reference_path, table_of
 from urdfkin.dh.rows import last_digits
 from urdfkin.kinematics.rotation import exp_rotation
-from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.chain import chain
 from urdfkin.model.tree import KinematicTree
 
 pytestmark = pytest.mark.long
-
-
-def ur5() -> FrameChain:
-    return urdfkin.load("ur5").chain("tool0", "base")
 
 
 def with_ends(name: str) -> tuple[urdfkin.Robot, str, str]:
@@ -33,19 +29,10 @@ def with_ends(name: str) -> tuple[urdfkin.Robot, str, str]:
     return (robot, "base", "tool0") if name == "ur5" else (robot, robot.base_frame, robot.tip_frame)
 
 
-def with_cell(table: DHTable, row: int, **cells: Any) -> DHTable:
-    rows = list(table.rows)
-    rows[row] = replace(rows[row], **cells)
-    return replace(table, rows=tuple(rows))
-
-
-def wrong_d1() -> DHTable:
-    table = read_table(reference_path("ur5"))
-    return with_cell(table, 0, d=table.rows[0].d + 0.01)
-
-
 def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
-    found = compare(ur5(), wrong_d1())
+    path, table = published("ur5")
+    wrong = with_cells(table, 0, d=table.rows[0].d + 0.01)
+    found = compare(path, wrong)
     assert found.agrees  # with a base fitted, it does
     assert not found.as_written
     assert found.written_metres == pytest.approx(0.01, rel=1e-6)
@@ -58,22 +45,22 @@ def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
     assert "has the same effect: d1" in text
     assert [(one.row, one.cell) for one in found.instead] == [(0, "d")]
     assert found.instead[0].difference == pytest.approx(-0.01, rel=1e-6)
-    found = compare(ur5(), wrong_d1(), fit=False)
+    found = compare(path, wrong, fit=False)
     assert not found.agrees
     assert [(one.row, one.cell) for one in found.differences] == [(0, "d")]
     assert found.differences[0].difference == pytest.approx(-0.01, rel=1e-6)
     assert found.residual <= 1e-12
 
 
-@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize(
     ("row", "cell"), [(0, "d"), (0, "theta"), (2, "theta"), (3, "d"), (1, "a"), (5, "d")]
 )
 def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cell: str) -> None:
-    path = ur5()
+    path, _ = published("ur5")
     table = dh_table(urdfkin.load("ur5").tree, "tool0", "base", convention, snap=1e-6)
     assert compare(path, table, fit=False).agrees
-    wrong = with_cell(table, row, **{cell: getattr(table.rows[row], cell) + 3e-3})
+    wrong = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 3e-3})
     found = compare(path, wrong, fit=False)
     assert not found.agrees
     assert found.metres > 1e-3 or found.radians > 1e-3
@@ -94,9 +81,7 @@ def test_only_a_table_that_is_the_urdf_as_written_has_every_cell_and_a_turned_to
 
 
 def test_cells_that_explain_nothing_are_not_blamed() -> None:
-    robot = urdfkin.load("kinova")
-    reference = read_table(reference_path("kinova"))
-    found = compare(robot.chain(reference.tip_frame, reference.base_frame), reference, fit=False)
+    found = compare(*published("kinova"), fit=False)
     assert not found.agrees
     assert found.differences == ()
     text = document(found, units_of()).text()
@@ -147,7 +132,7 @@ def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name:
 
 def test_cells_come_in_the_order_of_their_effect() -> None:
     table = dh_table(calibrated(urdfkin.load("ur5").tree, 1), "tool0", "base")
-    effects = [one.tip for one in compare(ur5(), table).differences]
+    effects = [one.tip for one in compare(published("ur5")[0], table).differences]
     assert len(effects) > 5
     assert effects == sorted(effects, reverse=True)
 
@@ -175,7 +160,7 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
         ".csv": "\n".join(["# convention: standard", "a,alpha,d,theta", *lines]),
     }[suffix])  # fmt: skip
     data = read_mapping(file)
-    found = compare(ur5(), table_of(data, "sheet"), digits=last_digits(data))
+    found = compare(published("ur5")[0], table_of(data, "sheet"), digits=last_digits(data))
     largest = found.differences[0]
     assert (largest.row, largest.cell) == (4, "d")
     assert largest.is_rounding == is_rounding

@@ -15,7 +15,7 @@ import urdfkin
 from tests import urdfs
 from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
-from tests.dh.test_compare import disguised, elbow
+from tests.dh.arms import disguised, elbow
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic
 from urdfkin.comparison.certificate import certificate, recheck

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.dh.arms import arm
+from tests.dh.arms import CONVENTIONS, arm
 from tests.random_chains import rotation, shift
 from urdfkin.dh import dh_table
 from urdfkin.errors import InputError
@@ -19,7 +19,7 @@ LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("convention", CONVENTIONS)
 def test_it_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
     text = drawing(dh_table(arm(LINK, LINK, LINK, kinds="RPR", tip=LINK), "tip", convention=convention))
     root = ET.fromstring(text)

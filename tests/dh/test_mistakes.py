@@ -12,23 +12,17 @@ import numpy as np
 import pytest
 
 from tests.cli.test_dh import run
-from tests.dh.arms import with_cell
-from urdfkin.dh import DHTable, read_table, table_from_rows, units_of
+from tests.dh.arms import published, with_cells
+from urdfkin.dh import DHTable, table_from_rows, units_of
 from urdfkin.dh.compare import TableComparison, compare, document
 from urdfkin.dh.convert import to_tree
 from urdfkin.dh.parse_table import reference_path, references
-from urdfkin.model.chain import FrameChain, chain
-from urdfkin.robot.loading import load
+from urdfkin.model.chain import chain
 
 pytestmark = pytest.mark.slow
 
 #: Tables that are the URDF's as they are written. Kinova's has frames of its own.
 AS_WRITTEN = ("panda", "ur5", pytest.param("xarm7_standard", marks=pytest.mark.long))
-
-
-def shipped(name: str) -> tuple[FrameChain, DHTable]:
-    table = read_table(reference_path(name))
-    return load(table.robot).chain(table.tip_frame, table.base_frame), table
 
 
 def with_wrong_signs(table: DHTable) -> Iterator[tuple[int, str, DHTable]]:
@@ -37,7 +31,7 @@ def with_wrong_signs(table: DHTable) -> Iterator[tuple[int, str, DHTable]]:
         for cell in ("a", "alpha", "d", "theta"):
             value = getattr(row, cell)
             if abs(value if cell in ("a", "d") else math.sin(value)) > 1e-9:
-                yield i, cell, with_cell(table, i, cell, -value)
+                yield i, cell, with_cells(table, i, **{cell: -value})
 
 
 def named(found: TableComparison) -> list[tuple[int, str, float]]:
@@ -47,7 +41,7 @@ def named(found: TableComparison) -> list[tuple[int, str, float]]:
 
 @pytest.mark.parametrize("name", AS_WRITTEN)
 def test_a_wrong_sign_is_named_alone(name: str) -> None:
-    path, table = shipped(name)
+    path, table = published(name)
     for row, cell, wrong in with_wrong_signs(table):
         found = compare(path, wrong)
         assert named(found) == [(row, cell, getattr(table.rows[row], cell))]
@@ -59,10 +53,10 @@ def test_a_wrong_sign_is_named_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", AS_WRITTEN)
 def test_an_alpha_with_a_right_angle_too_many_is_named_alone(name: str) -> None:
-    path, table = shipped(name)
+    path, table = published(name)
     for row in range(len(table.rows)):
         alpha = table.rows[row].alpha
-        found = compare(path, with_cell(table, row, "alpha", alpha + math.pi / 2))
+        found = compare(path, with_cells(table, row, alpha=alpha + math.pi / 2))
         assert [one[:2] for one in named(found)] == [(row, "alpha")]
         assert named(found)[0][2] == pytest.approx(alpha, abs=1e-15)
         assert not found.passes
@@ -70,7 +64,7 @@ def test_an_alpha_with_a_right_angle_too_many_is_named_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", [pytest.param("kinova", marks=pytest.mark.long), "panda", "ur5"])
 def test_rows_that_changed_places_are_named(name: str) -> None:
-    path, table = shipped(name)
+    path, table = published(name)
     last = len(table.rows) - 1
     for i, j in ((0, 1), (1, 2), (last - 1, last)):
         rows = list(table.rows)
@@ -84,7 +78,7 @@ def test_rows_that_changed_places_are_named(name: str) -> None:
 
 @pytest.mark.parametrize("name", references())
 def test_a_right_table_has_no_mistake(name: str) -> None:
-    path, table = shipped(name)
+    path, table = published(name)
     found = compare(path, table)
     assert found.mistakes == ()
     assert found.passes
@@ -94,7 +88,7 @@ def test_a_right_table_has_no_mistake(name: str) -> None:
 
 @pytest.mark.long
 def test_a_wrong_sign_is_named_where_the_table_leaves_out_its_tool() -> None:
-    path, table = shipped("panda")
+    path, table = published("panda")
     bare = replace(table, tool=np.eye(4))
     for row, cell, wrong in with_wrong_signs(bare):
         found = compare(path, wrong)
@@ -103,17 +97,17 @@ def test_a_wrong_sign_is_named_where_the_table_leaves_out_its_tool() -> None:
 
 
 def test_a_table_on_other_frames_says_that_a_wrong_sign_can_hide() -> None:
-    path, table = shipped("kinova")
+    path, table = published("kinova")
     text = document(compare(path, table), units_of()).text()
     assert "These changes can hide a wrong sign." in text
-    path, table = shipped("panda")
+    path, table = published("panda")
     assert "can hide" not in document(compare(path, replace(table, tool=np.eye(4))), units_of()).text()
 
 
 def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
     rows = [[0.1, 0.5, 0.3, 0.0], [0.2, 0.0, 0.05, 0.0], [0.15, 0.9, 0.05, 0.0], [0.1, 0.4, 0.1, 0.0]]
     wrong = table_from_rows(rows, "standard")
-    right = with_cell(wrong, 1, "d", -0.05)  # along parallel axes only the sum of the offsets shows
+    right = with_cells(wrong, 1, d=-0.05)  # along parallel axes only the sum of the offsets shows
     found = compare(chain(to_tree(right), right.tip_frame, right.base_frame), wrong)
     assert [one[:2] for one in named(found)] == [(1, "d"), (2, "d")]
     assert found.differences == ()
@@ -122,9 +116,9 @@ def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
 
 def test_a_wrong_sign_is_named_beside_a_difference_that_is_smaller() -> None:
     """A calibrated robot is off by a millimetre; the sign of a sheet is off by a hundred."""
-    path, table = shipped("panda")
-    near = with_cell(table, 6, "a", table.rows[6].a + 1e-3)
-    found = compare(path, with_cell(near, 3, "a", -near.rows[3].a))
+    path, table = published("panda")
+    near = with_cells(table, 6, a=table.rows[6].a + 1e-3)
+    found = compare(path, with_cells(near, 3, a=-near.rows[3].a))
     assert not found.agrees
     assert [one[:2] for one in named(found)] == [(3, "a")]
     assert 5e-4 < found.mistakes[0].metres < 2e-3

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tests.dh.arms import arm
+from tests.dh.arms import CONVENTIONS, arm
 from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from tests.reading import present
 from urdfkin.dh import DHTable, dh_table
@@ -47,7 +47,7 @@ def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArra
 @given(
     st.integers(0, 10_000),
     st.sampled_from([1e-9, 3.7e-6, 1e-4, 2e-3]),
-    st.sampled_from(["standard", "modified"]),
+    st.sampled_from(CONVENTIONS),
 )
 @settings(max_examples=50)
 def test_no_configuration_moves_the_tip_by_more_than_declared(seed: int, noise: Any, convention: Any) -> None:

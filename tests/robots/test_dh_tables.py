@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.dh.arms import published
 from tests.reading import present
 from urdfkin.dh import read_table
 from urdfkin.dh.common_normals import left_out
@@ -93,9 +94,7 @@ def test_every_cell_of_the_vendors_table_comes_out_of_the_urdf(name: str) -> Non
 
 @pytest.mark.slow
 def test_the_kinova_sheet_differs_by_its_rounding_and_the_way_its_joints_count() -> None:
-    reference = read_table(reference_path("kinova"))
-    robot = load("kinova")
-    found = compare(robot.chain(reference.tip_frame, reference.base_frame), reference)
+    found = compare(*published("kinova"))
     assert found.agrees
     assert [(one.row, one.cell) for one in found.differences] == [(3, "d")]
     assert found.differences[0].urdf == pytest.approx(-0.31105, abs=1e-9)
@@ -105,8 +104,7 @@ def test_the_kinova_sheet_differs_by_its_rounding_and_the_way_its_joints_count()
 @pytest.mark.slow
 @pytest.mark.parametrize("name", references())
 def test_a_shipped_reference_agrees_with_its_urdf_as_it_says(name: str) -> None:
-    reference = read_table(reference_path(name))
-    found = compare(load(reference.robot).chain(reference.tip_frame, reference.base_frame), reference)
+    found = compare(*published(name))
     text = reference_path(name).read_text()
     assert found.agrees
     assert found.residual <= 1e-12
@@ -118,13 +116,13 @@ def test_a_shipped_reference_agrees_with_its_urdf_as_it_says(name: str) -> None:
 @pytest.mark.slow
 def test_a_catalogue_that_is_wrong_by_03_mm_is_found_out() -> None:
     """A published xArm7 table (robotkinematicscatalogue 1.1.2) has a3 = 52.2 instead of 52.5 mm."""
-    reference = read_table(reference_path("xarm7_modified"))
+    path, reference = published("xarm7_modified")
     rows = list(reference.rows)
     rows[3] = replace(rows[3], a=0.0522, alpha=-math.pi / 2, theta=math.pi)
     rows[4] = replace(rows[4], a=-0.0775)
     rows[5] = replace(rows[5], alpha=-math.pi / 2)
     rows[6] = replace(rows[6], a=-0.076, alpha=math.pi / 2, theta=math.pi)
-    found = compare(load("xarm7").chain("link_eef", "link_base"), replace(reference, rows=tuple(rows)))
+    found = compare(path, replace(reference, rows=tuple(rows)))
     assert not found.agrees
     assert found.senses == (1, 1, 1, -1, 1, 1, 1)
     wrong = [one for one in found.differences if one.tip > 1e-4]

@@ -73,16 +73,8 @@ def test_on_the_boundary_itself_the_last_bit_decides_and_is_the_same_one() -> No
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_pinocchio_compares_the_vector_as_it_is_written_and_so_does_the_finding(kind: str) -> None:
-    for length in (
-        1.0 - 2e-12,
-        1.0 - 0.9e-12,
-        1.0 - 5e-13,
-        1.0 + 5e-13,
-        1.0 + 0.9e-12,
-        1.0 + 2e-12,
-        0.5,
-        2.0,
-    ):
+    around_one = [1.0 + side * size for side in (-1, 1) for size in (2e-12, 0.9e-12, 5e-13)]
+    for length in (*around_one, 0.5, 2.0):
         straight, tilted = length * AXES[1], length * AXES[1] + [0.0, 0.0, 4e-13]
         assert snaps(kind, straight) == (abs(length - 1.0) < 1e-12)
         assert not found(kind, straight)

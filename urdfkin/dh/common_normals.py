@@ -216,7 +216,7 @@ class PairWithReference:
 
         The offset is chosen so that the cell a has the same component along the tilt as in the reference. A
         small tilt determines this component only inaccurately. The component is then computed from the whole
-        cell a and from its component normal to the tilt. The result is None beyond `reach`.
+        cell a and from its component normal to the tilt. The result is None if it would exceed `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, reference_tilt = tilt_of(self.A), math.hypot(along, across)
@@ -248,7 +248,7 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def offset_before(self, carry: float) -> float:
-        """Convert the next joint's `carry` (metres; see `step`) to this joint's, for a row with d = 0."""
+        """Return this joint's `carry` (metres; see `step`) from the next joint's, for a row with d = 0."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
@@ -258,8 +258,8 @@ def steps_like(
     """Compute the transforms between consecutive axes of a path, and theta of each row, like a reference.
 
     `phi_in` (rad) and `carry` (metres) are the angle about the first axis and the offset along it, from frame
-    0 to the first joint's frame. `tip` is the `carry` (metres) of the last joint with which d of the last row
-    is as in the reference; None if d of the last row may differ.
+    0 to the first joint's frame. `tip` (metres) is the offset before the last row that makes d of this row
+    equal to d in the reference; None if these two offsets may differ.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -278,7 +278,7 @@ def steps_like(
 
 
 def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: float | None) -> float:
-    """Return a free d with which d of this row, or of a later row, is as in the reference."""
+    """Choose d so that d of this row, or of a later row, equals d in the reference."""
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
         return pair.row.d
@@ -289,8 +289,8 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # A later prismatic joint or the tool takes the remaining offset, so d can be chosen.
-        # A Hayati row in between makes the choice.
+        # Any d is correct, because a later prismatic joint or the tool compensates it.
+        # A Hayati row in between determines d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -306,7 +306,7 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
 def _free_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Return a free phi with which theta of this row or of later prismatic rows is as in the reference."""
+    """Choose phi so that theta of this row, or of later prismatic rows, equals theta in the reference."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -323,7 +323,7 @@ def _free_phi(
 
 
 def _closer_direction(step: AxisTransform, pair: PairWithReference, phi_in: float = 0.0) -> AxisTransform:
-    """Choose the direction of x with which a, alpha and beta, and then theta, are closer to the reference."""
+    """Choose the direction of x with which the cells differ less from the reference; theta decides ties."""
     row = pair.row
 
     def difference(step: AxisTransform) -> tuple[float, float]:
@@ -339,7 +339,7 @@ def theta_like(theta: float, reference: float) -> float:
     return reference if abs(angle_difference(theta, reference)) <= ANGLE * EPS else cleaned_angle(theta)
 
 
-#: Largest length (metres) whose square does not overflow in sums of common normals and bounds.
+#: Largest length (metres); sums of the squares of longer lengths may overflow.
 LONGEST = 1e150
 
 

@@ -40,7 +40,7 @@ from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Smallest excess (rad) of |theta| over a right angle at which x is reversed; 1.571 is not an excess.
+#: Tolerance (rad) by which |theta| may exceed a right angle before x is reversed; it covers 1.571.
 RIGHT_ANGLE_SLACK = 1e-3
 
 
@@ -132,11 +132,11 @@ def _table(
         a, alpha = first or (0.0, 0.0)
         steps = [AxisTransform(a=a, alpha=alpha), *steps[:-1]]
     rows = []
-    for joint, (theta, d), step in zip(chain.joints, theta_and_d, steps, strict=True):
+    for joint, (own_theta, own_d), step in zip(chain.joints, theta_and_d, steps, strict=True):
         # The sum with 0.0 makes a negative zero positive.
-        *cells, beta = (x + 0.0 for x in (step.a, step.alpha, d, theta, step.beta))
+        a, alpha, d, theta, beta = (x + 0.0 for x in (step.a, step.alpha, own_d, own_theta, step.beta))
         sense = -1 if joint.name in choices.flip else 1
-        rows.append(DHRow(*cells, joint.kind, joint.name, sense, beta, joint.mimic, joint.limit))
+        rows.append(DHRow(a, alpha, d, theta, joint.kind, joint.name, sense, beta, joint.mimic, joint.limit))
     return DHTable(choices.convention, tuple(rows), base, tool, chain.robot, chain.base, chain.tip)
 
 
@@ -228,7 +228,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[Floa
     base[:3, 3] = p - offset * z
     if tilt_of(A) <= noise.radians:  # z_0 is parallel or opposite to the base's z axis
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # This is e - (e . z) z for the base's x axis e, in a form without cancellation for z close to e.
+    # Projection e - (e . z) z of the base's x axis e, without cancellation for z close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
     if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis, so x_0 is made from the y axis.
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
@@ -258,7 +258,7 @@ def _steps(
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
     """Return the transforms between consecutive axes, and theta of each row."""
-    # The option "first" also begins with each offset in its own row; `_sum_offsets_in_first_row` follows.
+    # With "first", each row gets its own offset here, and `_sum_offsets_in_first_row` adds the offsets later.
     each = choices.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -278,7 +278,7 @@ def _steps(
 def _offset_for_last_row(
     like: DHTable, A: FloatArray, choices: Choices, noise: PoseTolerance
 ) -> float | None:
-    """Return the offset (metres) before the last row with which d of this row is as in `like`, or None."""
+    """Return the offset before the last row that makes d of this row equal to d in `like`, or None."""
     row = like.rows[-1]
     if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
         return None
@@ -292,7 +292,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy theta, and d if it is 0, from the first row of another table; the base takes the remainder."""
+    """Copy theta, and d if it is 0, from the first row of another table; change the base accordingly."""
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
     if abs(angle) > ANGLE * EPS or offset:
@@ -304,7 +304,7 @@ def _first_like(
 def _last_like(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Copy theta, a, alpha, and d if it is 0, from the last row of `like`; the tool takes the remainder.
+    """Copy theta, a, alpha, and d if it is 0, from the last row of `like`; change the tool accordingly.
 
     The last row is unchanged if neither table has a tool and theta is equal in the two tables.
     """

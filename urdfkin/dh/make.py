@@ -25,7 +25,7 @@ from urdfkin.model.tree import KinematicTree
 
 #: Largest difference between cells of two tables of the same robot (rad, or relative to the reach).
 _SAME_ROBOT = 0.1
-#: Largest difference (rad) between two equal zero positions, and between rotation entries of equal poses.
+#: Largest difference between equal zero positions (rad), and between entries of equal rotations.
 _SAME_ZERO = 1e-2
 #: Largest difference between two equal cells (rad, or relative to the reach).
 _ROUNDING = 1e-12

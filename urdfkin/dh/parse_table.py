@@ -33,7 +33,7 @@ from urdfkin.kinematics.rotation import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
-#: Largest error of a printed rotation, which has six digits.
+#: Largest error of a rotation that is printed with six digits.
 _PRINTED = 1e-5
 #: Maximum number of lines from the heading of a pose to its third row, with blank lines and Markdown fences.
 _POSE_LINES = 6

@@ -163,7 +163,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Snap the angles in Rz(phi) Rx(tilt) Rz(psi), the rotation of a pose; also return the changed angle."""
+    """Snap the angles of a pose's rotation Rz(phi) Rx(tilt) Rz(psi); also return the angle of the change."""
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])

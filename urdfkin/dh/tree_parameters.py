@@ -214,8 +214,7 @@ class _LinkAxis:
 def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_LinkAxis]()
-    # Each entry contains a link's antecedent, its pose in the antecedent's axis frame, and the number of
-    # joints between the two links.
+    # For each link: its antecedent, its pose in the antecedent's axis frame, the number of joints between.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]

@@ -44,7 +44,7 @@ _MISTAKE_CORRECTED = 0.05
 _LEAST_CHANGE = 1e-10
 #: Maximum number of cells that differ without a fit, in addition to the cells that differ after a fit.
 _MORE_CELLS = 2
-#: Smallest motion of the tip, relative to the path length, that defines the reach.
+#: Smallest spread of the tip's positions, relative to the path length, that is used as the reach.
 _FIXED_TIP = 1e-6
 #: Range of a prismatic joint without limits (metres).
 _SLIDE = (-0.5, 0.5)
@@ -269,7 +269,7 @@ def _differences_without_fit(
     check_targets: TargetPoses,
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ if no free parameter is fitted; () if they do not explain the error."""
+    """Return the cells that differ if no free parameter is fitted, or () if they do not explain the error."""
     corrected = fit_cells(written, targets, _mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
     if metres > EXPLAINED * targets.scale or radians > EXPLAINED:

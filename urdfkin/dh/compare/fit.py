@@ -65,7 +65,7 @@ _SAME_EFFECT = 1e-6
 _PATIENCE = 4
 #: Mean error of a fit, relative to the reach, at which joint offsets are no longer changed by large angles.
 _ROUNDING = 1e-13
-#: Tip error, relative to the reach, that is only rounding, so that no other joint signs are tried.
+#: Tip error, relative to the reach, below which no other joint signs are tried.
 _TIP_ROUNDING = 1e-12
 #: Largest tip error of a fit from other joint signs, relative to the fit from the written table.
 _OTHER_START_ERROR = 0.5
@@ -212,9 +212,8 @@ def with_changes(
     for i, offset in enumerate(free[12:]):
         k = model.variables[i]
         new_cells[i, k] += offset * units[k]
-    # The change of the base is expressed in the frame of the first revolute joint.
-    # The change of the tool is expressed in the frame of the last revolute joint.
-    # A rotation about the axis of this joint then exactly equals a change of the joint's offset.
+    # Base and tool are changed in the frame of the first or the last revolute joint.
+    # A rotation about the axis of that joint then exactly equals a change of the joint's offset.
     base = _with_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _with_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=new_cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
@@ -246,7 +245,7 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         by_cells = by_cells * mask.ravel()
         by_free = by_free if free else np.zeros_like(by_free)
         cells = _sparse_changes(model, start, by_free, by_cells, error, scale)
-        # Opposite changes of two offsets of nearly coinciding axes have almost no effect; rcond removes them.
+        # With rcond, the offsets of nearly coinciding axes do not change by large opposite angles.
         offsets = np.linalg.lstsq(by_free, error - by_cells @ cells, rcond=_RCOND_FREE)[0]
         shorten = min(1.0, _LONGEST_STEP * scale / max(float(np.abs(offsets).max()), NOT_ZERO))
         model = with_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)

@@ -87,7 +87,7 @@ def diagnose(
     shape_of_urdf = shape(derive(chain, Choices(last="flange")), chain.reach)
     try:
         stated = stated_interpretation(data)
-    except InputError:  # Another function reports this error.
+    except InputError:  # `table_from_mapping` reports this error.
         return None
     candidates = list[tuple[float, int, Interpretation, DHTable]]()
     for interpretation, table in other_interpretations(data):
@@ -157,11 +157,11 @@ def convention_that_fits(
 
 
 def shape(table: DHTable, scale: float) -> FloatArray:
-    """Return distance and angle (times `scale`) of each pair of consecutive axes, and the offset before it.
+    """Return offset, distance and angle (times `scale`) of each pair of consecutive axes.
 
-    These numbers do not depend on joint signs, joint offsets, base or tool. Offsets along parallel axes are
-    summed. A number is 0 if a choice can change it: the distance from a prismatic axis, the offsets next to
-    such an axis, and the offset along the first axis.
+    The offset is measured along the first of the two axes; offsets along parallel axes are summed. Joint
+    signs, joint offsets, base and tool do not change the result. A number is 0 if another choice could change
+    it: distances and offsets next to a prismatic axis, and the offset along the first axis of the path.
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False
@@ -186,7 +186,7 @@ class Interpretation:
 
     Attributes:
         convention: Standard or modified; None if the table names no convention.
-        columns: Contents of the columns that the table calls a, alpha, d and theta, or of its four columns.
+        columns: Quantities in the columns a, alpha, d and theta, or in the four columns without names.
     """
 
     convention: DHConvention | None
@@ -275,6 +275,6 @@ def table_warnings(table: DHTable) -> list[str]:
         if lengths_look_round and columns[angle] and not any(map(looks_round, columns[angle])):
             warnings.append(
                 f"the columns {length} and {angle} look exchanged: column {length} contains multiples of"
-                " common angles"
+                " 15 degrees"
             )
     return warnings

@@ -18,13 +18,13 @@ from urdfkin.kinematics.roundings import EPS, of_a_fit
 
 Parts = list[str | Table | Matrix]
 
-#: Largest remaining tip error if the differing cells explain the whole error.
+#: Largest tip error that may remain after the differing cells are corrected.
 #: The unit is rad for angles, and metres per metre of reach for positions.
 #: The rounding errors of a fit are far smaller, and the last digits in data sheets are far larger.
 EXPLAINED = 1e-9
 #: Finest resolution of printed fitted numbers (rad, or metres per metre of reach).
 _FINEST = 1e-12
-#: Largest rounding difference in units of half a last digit; decimals are rounded to doubles.
+#: Largest difference due to rounding, in half units of the last digit; decimals are not exact doubles.
 _HALF = 1.0 + 1e-6
 
 

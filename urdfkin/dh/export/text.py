@@ -24,7 +24,7 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: Factor of a bound before it is rounded up to three digits.
+#: Factor that is applied to a bound before the bound is rounded up to three digits.
 #: A rounding error of 1e-12 in the bound therefore does not increase the last digit.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
@@ -49,7 +49,7 @@ def variable(
 
 
 def coordinate_names(table: DHTable) -> str:
-    """Return a text such as "with q1 = left, q2 = right"; "" if each row has the coordinate of its joint."""
+    """Return for example "with q1 = left, q2 = right"; "" if the coordinates are the joints of the rows."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
@@ -228,5 +228,5 @@ def latex_math(text: str) -> str:
 
 
 def _with_powers_of_ten(text: str) -> str:
-    """Replace 1e-6 with a power of ten."""
+    """Write numbers such as 1e-6 as powers of ten."""
     return re.sub(r"e([+-])0*(\d+)", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)

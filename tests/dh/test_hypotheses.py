@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tests.cli.test_dh import UR5, run
-from tests.dh.test_compare import elbow
+from tests.dh.arms import CONVENTIONS, elbow, published
 from tests.reading import present
 from urdfkin.dh import DHTable, dh_table, read_table, table_from_rows
 from urdfkin.dh.compare import TOLERANCE, diagnose
@@ -60,8 +60,7 @@ SLIPS: dict[str, tuple[dict[str, Any], str]] = {
 @pytest.mark.parametrize("slip", SLIPS)
 @pytest.mark.parametrize("name", ["kinova", "panda", "ur5"])
 def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) -> None:
-    reference = read_table(reference_path(name))
-    path = load(reference.robot).chain(reference.tip_frame, reference.base_frame)
+    path, reference = published(name)
     options, words = SLIPS[slip]
     wrong = "modified" if str(reference.convention) == "standard" else "standard"
     found = present(diagnose(path, written(reference, wrong, **options), TOLERANCE))
@@ -154,7 +153,7 @@ def nameless(file: Path, convention: str) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("convention", CONVENTIONS)
 def test_a_table_without_convention_is_compared_in_the_one_that_fits(tmp_path: Path, convention: str) -> None:
     words = *UR5, "--compare", str(nameless(tmp_path / "ur5.toml", convention))
     result = run(*words)

@@ -1,0 +1,222 @@
+"""There and back: the other convention, a tree, a URDF, a table again; the placement never changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from tests.dh.arms import CONVENTIONS, EPS, error_ratio
+from tests.oracle import TreeOracle
+from tests.random_chains import configurations, trees
+from urdfkin.dh import convert, dh_table, read_table, table_from_rows, to_convention, to_tree, to_urdf
+from urdfkin.dh.parse_table import references
+from urdfkin.dh.table import DHConvention, DHRow, DHTable
+from urdfkin.errors import InputError
+from urdfkin.model.chain import chain
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
+from urdfkin.robot.loading import load
+from urdfkin.urdf import writer
+from urdfkin.validation.campaign import validate
+from urdfkin.verify.tables import TableError
+
+conventions = st.sampled_from(CONVENTIONS)
+ROW = DHRow(0.0, 0.0, 0.0, 0.0, JointKind.REVOLUTE, "j")
+UR5 = references()["ur5"]
+
+
+@pytest.mark.slow
+@given(trees(), conventions, st.sampled_from(["tip", "flange"]))
+@settings(max_examples=50)
+def test_a_convention_to_the_other_and_back_is_the_same_table(tree: Any, convention: str, last: str) -> None:
+    table = dh_table(tree, "tip", convention=convention, last=last)
+    other = "modified" if convention == "standard" else "standard"
+    there = to_convention(table, other)
+    back = to_convention(there, convention)
+    q = configurations(len(table.joint_names))
+    assert there.convention == other
+    for one in (there, back):
+        assert error_ratio(table, one.placement(q), table.placement(q), q) <= 3.0
+
+
+@pytest.mark.slow
+@given(trees(), conventions)
+@settings(max_examples=40)
+def test_the_tree_of_a_table_and_a_table_of_this_tree_place_the_tip_alike(tree: Any, convention: str) -> None:
+    table = dh_table(tree, "tip", convention=convention)
+    robot = to_tree(table)
+    tip = robot.links[robot.frame_link("tip")]
+    q = configurations(robot.nq, 4)
+    path = chain(robot, tip)
+    own = path.coupling.select(robot, q)
+    assert set(path.joint_names) == set(table.joint_names)
+    expected = table.placement(own[:, [path.joint_names.index(name) for name in table.joint_names]])
+    again = dh_table(robot, tip, convention=convention)
+    for found in (TreeOracle(robot).placement(q, tip, robot.links[0]), again.placement(own)):
+        assert error_ratio(table, found, expected, own) <= 3.0
+
+
+#: The Stanford arm.
+STANFORD = [
+    [0, "-pi/2", 0.412, 0], [0, "pi/2", 0.154, 0], [0.0203, 0, 0, "-pi/2", "P"], [0, "-pi/2", 0, 0],
+    [0, "pi/2", 0, 0], [0, 0, 0, 0],
+]  # fmt: skip
+
+
+def test_the_stanford_arm_survives_the_way_to_a_tree_and_back_cell_by_cell() -> None:
+    table = table_from_rows(STANFORD, "standard")
+    again = dh_table(to_tree(table), "tip")
+    np.testing.assert_allclose(
+        [row.cells for row in again.rows], [row.cells for row in table.rows], rtol=0, atol=1e-12
+    )
+    for end in (again.base, again.tool):
+        np.testing.assert_allclose(end, np.eye(4), atol=1e-15)
+
+
+def test_a_leader_off_the_path_stays_a_coordinate_in_the_tree() -> None:
+    table = DHTable(DHConvention.STANDARD, (replace(ROW, a=0.3, mimic=Mimic("far", 2.0, 0.1)),))
+    robot = to_tree(table)
+    assert table.joint_names == ("far",)
+    assert robot.nq == 1
+    q = np.array([[0.2]])
+    np.testing.assert_allclose(TreeOracle(robot).placement(q, "tip", "base"), table.placement(q), atol=1e-15)
+
+
+# -- a URDF --------------------------------------------------------------------------------------------
+
+
+def placements(text: str, names: tuple[str, ...], q: FloatArray, tip: str) -> FloatArray:
+    """Poses of a frame by Pinocchio's own reading of a URDF, coordinates given by joint name."""
+    model = pin.buildModelFromXML(text)
+    data = model.createData()
+    poses = []
+    for one in q:
+        full = pin.neutral(model)
+        for name, value in zip(names, one, strict=True):
+            joint = model.joints[model.getJointId(name)]
+            own = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+            full[joint.idx_q : joint.idx_q + joint.nq] = own
+        pin.framesForwardKinematics(model, data, full)
+        poses.append(data.oMf[model.getFrameId(tip, pin.FrameType.BODY)].homogeneous)
+    return np.array(poses)
+
+
+def taken_for_a_coordinate_axis(tree: KinematicTree) -> bool:
+    """Whether Pinocchio rounds an axis: it takes one within 1e-12 of x, y or z for that."""
+    off = [np.sort(np.abs(joint.axis))[1] for joint in tree.joints]
+    return any(0.0 < x < 1e-10 for x in off)
+
+
+@pytest.mark.slow
+@given(trees(min_joints=1, mimics=False), conventions)
+@settings(max_examples=30)
+def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, convention: str) -> None:
+    assume(not taken_for_a_coordinate_axis(tree))
+    table = dh_table(tree, "tip", convention=convention)
+    q = configurations(tree.nq, 4)
+    before = placements(writer.to_urdf(tree), table.joint_names, q, "tip")
+    after = placements(to_urdf(table), table.joint_names, q, to_tree(table).links[-1])
+    assert error_ratio(table, after, before, q, slack=EPS) <= 4.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "base", "tip"),
+    [("ur5", "base", "tool0"), ("panda", "panda_link0", "panda_hand"),
+     ("tiago", "base_link", "arm_tool_link"), ("talos", "left_sole_link", "imu_link")],
+)  # fmt: skip
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_a_robot_survives_a_way_to_a_table_and_back(name: str, base: str, tip: str, convention: str) -> None:
+    robot = load(name)
+    table = robot.dh(tip, base, convention)
+    again = load(table)
+    q = robot.sample(6)
+    own = robot.select(table, q)
+    order = [table.joint_names.index(joint) for joint in again.coordinate_names]
+    T_base, T_tip = robot.placement(q, base), robot.placement(q, tip)
+    found = again.placement(own[:, order], again.tip_frame)
+    np.testing.assert_allclose(found, np.linalg.solve(T_base, T_tip), atol=1e-14)
+    assert again.certificate().verified
+    np.testing.assert_allclose(again.dh(convention=convention).placement(own), found, atol=1e-14)
+
+
+# -- a robot -------------------------------------------------------------------------------------------
+
+SLIDING = table_from_rows([[0, "pi/2", 0.3, 0], [0, 0, 0.1, 0, "P"]], "standard")
+
+
+@pytest.mark.parametrize("name", [*references(), "a sliding joint without limits"])
+def test_a_table_is_a_robot(name: str) -> None:
+    table = read_table(references()[name]) if name in references() else SLIDING
+    robot = load(table)
+    q = robot.sample(4)
+    np.testing.assert_allclose(robot.placement(q, table.tip_frame), table.placement(q), atol=1e-13)
+    assert robot.certificate().verified
+
+
+@pytest.mark.parametrize("root_joint", [None, "floating"])
+def test_a_tables_file_is_a_source_like_any_other(tmp_path: Path, root_joint: str | None) -> None:
+    file = tmp_path / "arm.toml"
+    file.write_bytes(UR5.read_bytes())
+    robot, same = (load(source, root_joint=root_joint) for source in (file, read_table(UR5)))
+    q = robot.sample(3)
+    np.testing.assert_array_equal(robot.jacobian(q, "tool0"), same.jacobian(q, "tool0"))
+    assert robot.certificate().verified
+    assert (robot.source, same.source) == (str(file), "<table>")
+    assert robot.origin.python.startswith(f"urdfkin.load({str(file)!r}")
+
+
+def test_a_table_is_validated_as_it_is_and_as_a_file() -> None:
+    report = validate([str(UR5), read_table(UR5)], samples=2)
+    assert report.passed
+    assert [robot.source for robot in report.robots] == [str(UR5), "<table>"]
+    assert report.robots[0].results == report.robots[1].results
+
+
+def test_a_urdf_that_is_not_the_tables_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = read_table(UR5)
+    other = replace(table, rows=(replace(table.rows[0], d=table.rows[0].d + 1e-9), *table.rows[1:]))
+    monkeypatch.setattr(convert, "to_urdf", lambda _: to_urdf(other))
+    with pytest.raises(TableError, match="the URDF made of a table differs from the table"):
+        load(table)
+    assert load(table, verify=False).nq == 6
+
+
+def test_a_table_takes_no_xacro_arguments() -> None:
+    with pytest.raises(InputError, match="`xacro_args` needs"):
+        load(read_table(UR5), xacro_args={"arm": "left"})
+
+
+# -- inconsistent tables -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"a": float("nan")}, "row of joint j: a is not a finite number"),
+        ({"sense": 2}, r"`sense` must be \+1 or -1"),
+        ({"kind": JointKind.FLOATING}, "revolute, continuous or prismatic"),
+    ],
+)
+def test_an_inconsistent_row_is_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        replace(ROW, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"rows": (ROW, ROW)}, "two rows name the same joint: found 'j'"),
+        ({"base": np.diag([1.0, 1.0, 2.0, 1.0])}, "rotation and a translation"),
+        ({"tool": np.eye(3)}, r"\(4, 4\)"),
+    ],
+)
+def test_two_rows_of_one_joint_and_a_bent_base_are_refused(change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        replace(DHTable(DHConvention.STANDARD, (ROW,)), **change)

@@ -1,0 +1,571 @@
+"""Tables are read from files as people have them, and a wrong file is told what is wrong with it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import re
+from collections import Counter
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.cli.test_dh import run
+from tests.dh.arms import CONVENTIONS
+from tests.random_chains import trees
+from tests.reading import present
+from urdfkin.dh import (
+    dh_table,
+    export,
+    read_table,
+    table_from_mapping,
+    table_from_rows,
+    to_convention,
+    units_of,
+)
+from urdfkin.dh.compare import compare
+from urdfkin.dh.parse_table import (
+    is_table_file,
+    mapping_from_text,
+    read_mapping,
+    reference_path,
+    references,
+    table_from_text,
+)
+from urdfkin.dh.rows import last_digits
+from urdfkin.dh.units import InvalidCellError, parse_cell
+from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
+from urdfkin.model.tree import KinematicTree
+from urdfkin.robot.loading import load
+
+ROWS = [[0.0, "pi/2", 0.3, 0.0, "R"], [0.4, 0.0, 0.0, -1.0, "P"]]
+
+
+@pytest.mark.slow
+@given(trees(), st.sampled_from(CONVENTIONS), st.sampled_from(["toml", "json", "csv"]))
+@settings(max_examples=50)
+def test_a_written_table_reads_back_to_the_bit(tree: KinematicTree, convention: str, form: str) -> None:
+    table = dh_table(tree, "tip", convention=convention)
+    again = table_from_text(export(table, form), f".{form}")
+    assert again.rows == table.rows
+    assert again.convention is table.convention
+    assert (again.robot, again.base_frame, again.tip_frame) == (table.robot, "l0", "tip")
+    np.testing.assert_array_equal(again.base, table.base)
+    np.testing.assert_array_equal(again.tool, table.tool)
+
+
+def test_a_file_is_read_by_its_ending(tmp_path: Path) -> None:
+    path = tmp_path / "arm.json"
+    path.write_text(json.dumps({"convention": "standard", "rows": ROWS}))
+    table = read_table(path)
+    assert [row.kind.value for row in table.rows] == ["revolute", "prismatic"]
+    assert table.joint_names == ("joint_1", "joint_2")
+
+
+def test_a_broken_or_missing_file_is_named(tmp_path: Path) -> None:
+    bad = 'convention = "standard"\nrows = [["x", 0, 0, 0]]'
+    for name, text, message in (
+        ("broken.toml", "rows = [", "broken.toml: not valid TOML"),
+        ("arm.xls", "", "must have the suffix .toml, .json, .csv, .tsv"),
+        ("bad.toml", bad, "bad.toml, row 1, a: this is not a number"),
+    ):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InputError, match=message):
+            read_table(tmp_path / name)
+    with pytest.raises(SourceError, match="cannot be read"):
+        read_table(tmp_path / "missing.toml")
+
+
+# -- tables are read as people have them: spreadsheets, READMEs, papers, web pages, what programs print ------
+
+
+#: A file -> its convention and its rows: a, alpha, d, theta, R or P.
+SHEETS: dict[str, tuple[str, str, list[tuple[float, float, float, float, str]]]] = {
+    "excel.csv": (
+        "\ufeffsep=;\r\nconvention: standard;;;;\r\nJoint;a [mm];α [°];d [mm];θ [°]\r\n"
+        "A1;0;90;89,159;0\r\nA2;-425;0;0;-45,5\r\n",
+        "standard",
+        [(0, math.pi / 2, 0.089159, 0, "R"), (-0.425, 0, 0, math.radians(-45.5), "R")],
+    ),
+    "toolbox.txt": (
+        "DHRobot: UR5 (by Universal Robotics), 6 joints (RRRRRR), standard DH parameters\n"
+        "┌───────────┬─────────┬─────────┬────────┐\n│θⱼ  │   dⱼ    │   aⱼ    │   ⍺ⱼ   │\n├──┼──┼──┼──┤\n"
+        "│ q1 │ 0.08946 │       0 │  90.0° │\n│ q2 + 180° │       0 │  -0.425 │   0.0° │\n└──┴──┴──┴──┘\n",
+        "standard",
+        [(0, math.pi / 2, 0.08946, 0, "R"), (-0.425, 0, 0, math.pi, "R")],
+    ),
+    "toolbox_modified.txt": (
+        "│ aⱼ₋₁  │  ⍺ⱼ₋₁  │ θⱼ  │  dⱼ   │\n├──┼──┼──┼──┤\n│ 0.0 │ 0.0° │  q1 │ 0.333 │\n"
+        "│ 0.0 │ -90.0° │  q2 │ 0.0 │\n",
+        "modified",
+        [(0, 0, 0.333, 0, "R"), (0, -math.pi / 2, 0, 0, "R")],
+    ),
+    "readme.md": (
+        "Modified DH parameters (Craig)\n\n| Joint | $a_{i-1}$ (mm) | $\\alpha_{i-1}$ (rad) | $d_i$ |"
+        " $\\theta_i$ |\n|---|:--:|---|---|---|\n| 1 | 0 | 0 | 333 mm | $\\theta_1$ |\n"
+        "| 2 | 82.5 | $-\\frac{\\pi}{2}$ | 0 | θ₂* + π |\n\nThe end.\n",
+        "modified",
+        [(0, 0, 0.333, 0, "R"), (0.0825, -math.pi / 2, 0, math.pi, "R")],
+    ),
+    "paper.tex": (
+        "In the classical convention,\n\\begin{tabular}{c|cccc}\\hline\nLink & $a_i$ & $\\alpha_i$ & $d_i$ &"
+        " $\\theta_i$ \\\\ \\hline\n1 & $0$ & $\\pi/2$ & $0.4$ & $\\theta_1^*$ \\\\\n"
+        "2 & $0.3$ & $-90^\\circ$ & $-d_2^* + 0.1$ & $0$ \\\\[2pt] \\hline\n\\end{tabular}\n",
+        "standard",
+        [(0, math.pi / 2, 0.4, 0, "R"), (0.3, -math.pi / 2, 0.1, 0, "P")],
+    ),
+    "vendor.tsv": (
+        "standard DH\nKinematics\ttheta [rad]\ta [m]\td [m]\talpha [rad]\nJoint 1\t0\t0\t0.1625\tπ/2\n"
+        "Joint 2\t0\t-0.425\t0\t0\n",
+        "standard",
+        [(0, math.pi / 2, 0.1625, 0, "R"), (-0.425, 0, 0, 0, "R")],
+    ),
+    "narrow.txt": (
+        "convention: modified\ni a(i-1) alpha(i-1) d theta\n1 0 0 0.333 q1\n2 0 -pi/2 0 q2 - pi / 2\n",
+        "modified",
+        [(0, 0, 0.333, 0, "R"), (0, -math.pi / 2, 0, -math.pi / 2, "R")],
+    ),
+    "offset.csv": (
+        "# convention: standard\ntheta,d,a,alpha,offset,sigma\n0,0.3,0,-pi/2,pi/4,0\n0,0,0.1,0,-0.05,1\n",
+        "standard",
+        [(0, -math.pi / 2, 0.3, math.pi / 4, "R"), (0.1, 0, -0.05, 0, "P")],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_sheet_is_read_as_its_author_meant_it(name: str, tmp_path: Path) -> None:
+    text, convention, rows = SHEETS[name]
+    path = tmp_path / name
+    path.write_text(text, "utf-8")
+    table = read_table(path)
+    assert table.convention == convention
+    for row, (*cells, kind) in zip(table.rows, rows, strict=True):
+        assert row.cells[:4] == pytest.approx(cells, abs=1e-15)
+        assert row.kind.turns == (kind == "R")
+    assert load(path, verify=False).nq == len(rows)
+
+
+def test_the_sign_of_a_variable_is_the_rows_sense() -> None:
+    assert table_from_text(SHEETS["paper.tex"][0], ".tex").rows[1].sense == -1
+    text = 'convention = "standard"\nrows = [{theta = "-q1 + 90 deg", d = "107 mm"}]'
+    (row,) = table_from_text(text, ".toml").rows
+    assert (row.sense, row.theta, row.d) == (-1, math.pi / 2, 0.107)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", ["terminal", "markdown", "latex", "csv"])
+@pytest.mark.parametrize("name", references())
+def test_what_urdfkin_prints_is_read_again(name: str, form: str) -> None:
+    table = read_table(reference_path(name))
+    for units in (units_of(), units_of("degrees", "millimetres")):
+        again = table_from_text(export(table, form, units), SUFFIXES[form])
+        for one in ("robot", "base_frame", "tip_frame", "convention"):
+            assert getattr(again, one) == getattr(table, one)
+        assert [row.joint for row in again.rows] == [row.joint for row in table.rows]
+        q = np.linspace(-1, 1, len(table.rows))
+        np.testing.assert_allclose(again.placement(q), table.placement(q), atol=1e-9)
+
+
+def test_a_robot_called_robot_is_no_key_of_a_sheet() -> None:
+    table = table_from_rows([[0.3, 0, 0, 0]], "standard")
+    assert table.robot == "robot"
+    assert table_from_text(export(table, "terminal"), ".txt").robot == "robot"
+
+
+@pytest.mark.slow
+@given(trees(min_joints=1), *map(st.sampled_from, (("standard", "modified"), ("terminal", "markdown"))))
+@settings(max_examples=40)
+def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: str, form: str) -> None:
+    table = dh_table(tree, "tip", convention=convention)
+    again = table_from_text(export(table, form, units_of(digits=17)), SUFFIXES[form])
+    assert again.joint_names == table.joint_names
+    q = np.linspace(-1, 1, len(table.joint_names))
+    np.testing.assert_allclose(again.placement(q), table.placement(q), atol=1e-8 * max(1.0, table.span))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "1_0", "nan", "1 2", "--1", "1/0", "q1 + q2", "pi deg", "3 *", "* 3", "٣", "1e999"]
+)
+def test_what_is_no_cell_is_refused(text: str) -> None:
+    with pytest.raises(InvalidCellError):
+        parse_cell(text)
+
+
+@pytest.mark.slow
+@given(st.text(max_size=30))
+@settings(max_examples=300)
+def test_any_text_is_a_cell_or_is_refused(text: str) -> None:
+    with contextlib.suppress(InvalidCellError):
+        assert math.isfinite(parse_cell(text).number)
+
+
+def test_the_last_digit_of_a_cell_with_a_unit_is_known() -> None:
+    data = mapping_from_text("a;alpha;d;theta\n311,1 mm;90°;0,25;0\n", ".csv", "sheet")
+    assert last_digits({"convention": "standard", **data})[0] == {
+        "a": pytest.approx(5e-5), "alpha": 0.0, "d": pytest.approx(5e-3), "theta": 0.0,
+    }  # fmt: skip
+
+
+def test_a_urdf_may_end_in_txt(tmp_path: Path) -> None:
+    urdf, table = tmp_path / "robot.txt", tmp_path / "table.txt"
+    urdf.write_text("  <robot name='r'><link name='l'/></robot>")
+    table.write_text(SHEETS["narrow.txt"][0])
+    assert not is_table_file(urdf)
+    assert is_table_file(table)
+
+
+def test_a_table_given_as_robot_is_written_as_it_stands(tmp_path: Path) -> None:
+    path, out = str(reference_path("kinova")), tmp_path / "again.csv"
+    result = run(path, "--degrees")
+    assert "q1 + 180" in result.text
+    assert "agrees within rounding" in result.text
+    assert run(path, "--format", "csv", "-o", str(out)).code == 0
+    assert read_table(out).rows[0].theta == math.pi
+    modified = run(path, "--convention", "modified", "--format", "csv", "-o", str(out))
+    assert modified.code == 0
+    wanted = to_convention(read_table(path), "modified")
+    assert [row.cells for row in read_table(out).rows] == [row.cells for row in wanted.rows]
+    derived = run(path, "--last", "flange")
+    assert "q1 + pi" not in derived.text
+
+
+@pytest.mark.parametrize(
+    "header", ["a;alpha,d,theta", "a,alpha;d,theta", "a_i;alpha,d,theta", "a|alpha,d,theta"]
+)
+def test_headings_with_mixed_separators_are_refused(header: str) -> None:
+    words = "the line of column headings has another separator than the other lines"
+    with pytest.raises(InputError, match=words):
+        table_from_text(f"# convention: standard\n{header}\n0,pi/2,0.1,0\n", ".csv")
+
+
+@pytest.mark.parametrize("number", ["1e4000", "nan", "-inf"])
+def test_a_base_with_an_infinite_number_is_refused(number: str) -> None:
+    """LAPACK's singular values of such a matrix never returned."""
+    rows = f" 1 0 0 0\n {number} 1 0 0\n 0 0 1 0\n"
+    sheet = f"standard\na  alpha  d  theta\n0  pi/2  0.3  q1\n\nbase (metres):\n{rows}"
+    with pytest.raises(InputError, match="the base must be a matrix of finite numbers"):
+        table_from_text(sheet, ".txt")
+
+
+@pytest.mark.parametrize("form", ["to_markdown", "to_latex", "to_html"])
+def test_a_table_in_a_form_has_radians_metres_and_ten_digits_unless_asked(form: str) -> None:
+    write = getattr(table_from_rows([[math.sqrt(2.0), 0.1, math.sqrt(0.5), 0.0]], "standard"), form)
+    assert write() == write("radians", "metres", 10)
+    assert "1.4142135624" not in write()
+    assert "1.4142135624" in write(digits=11)
+
+
+#: Texts that replace characters of a table, to damage it.
+PIECES = (
+    *",;\t|& \"'\n\\{}[]()_^$-+*/0123456789eqadtheta.\x00\ufeffα",
+    *("", "nan", "inf", "1e400", "1e155", "(i-1)"),
+)
+#: For each format of `export`: the suffix of its files.
+SUFFIXES = {
+    "csv": ".csv", "markdown": ".md", "latex": ".tex", "terminal": ".txt", "toml": ".toml", "json": ".json",
+}  # fmt: skip
+
+
+@cache
+def printed_ur5() -> dict[str, str]:
+    table = read_table(reference_path("ur5"))
+    rows = "0\tpi/2\t0,1\t0\n" * len(table.rows)
+    sheets = {suffix: export(table, form) for form, suffix in SUFFIXES.items()}
+    return {**sheets, ".tsv": f"convention: standard\na\talpha\td\ttheta\n{rows}"}
+
+
+@st.composite
+def damaged(draw: st.DrawFn) -> tuple[str, str]:
+    """The suffix and the text of a table with a few characters changed, removed or repeated."""
+    suffix = draw(st.sampled_from([*SUFFIXES.values(), ".tsv"]))
+    text = printed_ur5()[suffix]
+    for _ in range(draw(st.integers(1, 5))):
+        head = max(text.find("theta"), 40) + 20  # damage near the headings is the most instructive
+        k = draw(st.integers(0, min(head, len(text))) | st.integers(0, len(text)))
+        piece = draw(st.sampled_from((*PIECES, text[k : k + 4], 3 * text[k : k + 4])))
+        text = text[:k] + piece + text[k + draw(st.integers(0, 12)) :]
+    return suffix, text
+
+
+@pytest.mark.slow
+def test_a_damaged_table_is_refused_with_a_message_or_read_and_compared() -> None:
+    path, outcomes = load("ur5").chain("tool0", "base"), Counter[str]()
+
+    @settings(max_examples=100)
+    @given(damaged())
+    def judge(sheet: tuple[str, str]) -> None:
+        suffix, text = sheet
+        try:
+            compare(path, table_from_text(text, suffix))
+        except UrdfkinError as error:
+            outcomes["refused"] += bool(str(error))
+        else:
+            outcomes["read"] += 1
+
+    judge()
+    assert outcomes["refused"] > 10
+    assert outcomes["read"] > 10
+
+
+# -- each wrong file gets one error with the file, the row, the column, the value and the remedy -----------
+
+UR5 = [
+    ["0", "pi/2", "0.089159", "0"], ["-0.425", "0", "0", "0"], ["-0.39225", "0", "0", "0"],
+    ["0", "pi/2", "0.10915", "0"], ["0", "-pi/2", "0.09465", "0"], ["0", "0", "0.0823", "0"],
+]  # fmt: skip
+
+
+def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
+    """What reading says, which begins with the file's name."""
+    file = tmp_path / f"table{suffix}"
+    file.write_text(text)
+    with pytest.raises(UrdfkinError) as caught:
+        read_table(file)
+    assert str(caught.value).startswith(str(file))
+    return str(caught.value).removeprefix(str(file))
+
+
+def of_rows(rows: str, keys: dict[str, str]) -> str:
+    """A TOML file; a key with an empty value is left out."""
+    lines = {"convention": "'standard'", **keys, "rows": rows}
+    return "".join(f"{key} = {value}\n" for key, value in lines.items() if value)
+
+
+@pytest.mark.parametrize(
+    ("rows", "keys", "message"),
+    [
+        ("[[0.1, 90, 0, 0]]", {}, "row 1, alpha: alpha is more than one turn.*found 90; write angles = 'deg"),
+        ("[[0, 0, 0, 0], [0, 0, 0, -180.0]]", {}, r"row 2, theta: .*found -180.0; write angles = 'degrees'"),
+        ('[{beta = 45, a = 1}]', {}, "row 1, beta: beta is more than one turn in radians"),
+        (
+            "[[0, 0.089, 0, 1.5708], [0, 0.1, 0.4, 0], [0, 0.3, 0, -1.5708]]", {},
+            "rows 1 to 3: the columns look like theta, d, a, alpha.*found second column 0.089",
+        ),
+        (
+            "[[0, 89.2, 0, 90], [0, 10.1, 0.4, 0]]", {"angles": '"degrees"', "lengths": '"millimetres"'},
+            "the columns look like theta, d, a, alpha",
+        ),
+        ("[[0, 0.089, 0, 1.5708, 0]]", {}, "row 1: .* must be 'R' or 'P'.*found 0; .*theta, d, a, alpha"),
+        ("[[0, 0, 0.1, 0, 'R', 7]]", {}, r"row 1: .*found 6 entries, \[0, 0, 0.1, 0, 'R', 7\]"),
+        ("[{a = 1, sense = 1.9}]", {}, "row 1, sense: `sense` must be 1 or -1: found 1.9"),
+        ("[{a = 1, sense = '-1.5'}]", {}, "row 1, sense: `sense` must be 1 or -1: found '-1.5'"),
+        (
+            "[{joint = 'left', a = 1}, {joint = 'right', mimic = {leader = 'lefft'}}]", {},
+            "row 2, leader: unknown joint 'lefft'; did you mean left.*coordinates",
+        ),
+        (
+            "[{joint='a', mimic={leader='c'}}, {joint='b', mimic={leader='a'}}, {joint='c'}]", {},
+            "row 2, leader: a joint cannot mimic a mimic joint: found 'a'",
+        ),
+        ("[{joint = 'a', mimic = {leader = 'a'}}]", {}, "row 1, leader: a joint cannot mimic a mimic joint"),
+        ("[{mimic = {leader = 'b', factor = 2}}]", {}, "row 1: unknown key in mimic: found 'factor'"),
+        ("[{joint = 'a', limit = {min = 2}}]", {}, "row 1: unknown key in limit: found 'min'"),
+        ("[{limit = {lower = 2, upper = 1}}]", {}, "row 1, limit: `lower` is above `upper`: found 2 and 1"),
+        ("[{joint = 'a', limit = {lower = nan}}]", {}, "row 1, lower: not a finite number: found nan"),
+        ("[]", {}, r"rows: a table needs a row, a base or a tool: found \[\]"),
+        ("[{joint = 5}]", {}, "row 1, joint: a name must be text: found 5"),
+        ("[{a = true}]", {}, "row 1, a: this is not a number: found True"),
+        ("[{a = '1_0'}]", {}, "row 1, a: this is not a number: found '1_0'"),
+        ("[{a = '١'}]", {}, "row 1, a: this is not a number"),
+        ("[{d = inf}]", {}, "row 1, d: not a finite number: found inf"),
+        ("[{a = 'pi/0'}]", {}, "row 1, a: this is not a number: found 'pi/0'"),
+        (f"[{{a = 1{'0' * 400}}}]", {}, "row 1, a: this is not a number"),
+        ("[{a = 1979-05-27}]", {}, "row 1, a: this is not a number"),
+        ("[{a = 1}]", {"robot": "1979-05-27"}, "robot: a name must be text"),
+        ("[{a = 1}]", {"angles": "1979-05-27"}, "angles or lengths: unknown unit"),
+        ("[{kind = 3}]", {}, "row 1, kind: the kind of a row must be revolute, .*: found 3"),
+        ("[{a = 1}]", {"robot": "7"}, "robot: a name must be text: found 7"),
+        ("[{a = 1}]", {"base_frame": "''"}, "base_frame: a name must be text: found ''"),
+        ("[{a = 1}]", {"base": "[[1,0,0,'0'], [0,1,0,'x'], [0,0,1,0]]"}, "base, row 2, column 4: this is"),
+        ("[{a = 1}]", {"tool": "[1, 2, 3]"}, "tool: the tool must be a matrix of numbers, 4 x 4 or 3 x 4"),
+        ("[{a = 1}]", {"angles": "['deg']"}, "unknown unit"),
+        ("[{a = 1}]", {"coordinates": "'q'"}, "coordinates: `coordinates` must be a list of names"),
+        ("'none'", {}, "rows: a table needs a list of rows: found 'none'"),
+        ("[[0, 0, 0, 0, 'X']]", {}, "row 1, kind: the kind of a row must be revolute, continuous or"),
+        ("[{a = 0, alhpa = 1}]", {}, "unknown key in a row: found 'alhpa'"),
+        ("[{mimic = 'j1'}]", {}, "`mimic` must have the form {leader"),
+        ("[{a = 1}]", {"anlges": "'degrees'"}, "unknown key in a table: found 'anlges'"),
+        ("[{a = 1}]", {"convention": "'dh'"}, "unknown convention: found 'dh'"),
+        ("[{a = 1}]", {"convention": ""}, "does not name its convention"),
+    ],
+)  # fmt: skip
+def test_a_wrong_table_says_where_and_what(
+    rows: str, keys: dict[str, str], message: str, tmp_path: Path
+) -> None:
+    assert re.search(message, refused(tmp_path, of_rows(rows, keys)))
+
+
+def test_a_robot_that_is_null_is_an_error_and_a_csv_that_a_spreadsheet_wrote_is_none(tmp_path: Path) -> None:
+    text = json.dumps({"convention": "standard", "robot": None, "rows": [[0.1, 0, 0, 0]]})
+    assert "robot: a name must be text: found None" in refused(tmp_path, text, ".json")
+    file = tmp_path / "sheet.csv"
+    file.write_bytes(b"\xef\xbb\xbf# convention: standard\r\na,alpha,d,theta\r\n0.1,pi/2,0,0\r\n,,,\r\n")
+    assert read_table(file).rows[0].cells == (0.1, math.pi / 2, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a,alpha,d,theta\n0.1,0,0,0,7\n", "row 1: a row needs a cell for each of the 4 columns: found 5"),
+        (
+            "a,alpha,d,theta\n0.1,0,0,0\n0.1,0,0\n",
+            "row 2: a row needs a cell for each of the 4 columns: found 3",
+        ),
+        ("a,d,theta\n0.1,0,0\n", "header: the table has no column 'alpha': found a, d, theta"),
+        ("0.1,0,0,0\n", "header: the table has no column 'a'"),
+        ("a,a,alpha,d,theta\n1,1,0,0,0\n", "header: the column 'a' occurs twice"),
+        ("a,alpha,d,theta\n0.1,,0,0\n", "row 1, alpha: this is not a number: found ''"),
+        ("a,alpha,d,theta,mass\n0.1,0,0,0,1\n", "row 1: unknown key in a row: found 'mass'"),
+        ("a,alpha,d,theta,twist\n0.1,0,0,0,1\n", "header: the column 'alpha' occurs twice"),
+        ("", "header: the table has no column 'a': found nothing"),
+        ("a,alpha,d,theta\n", "rows: a table needs a row"),
+        ("# anlges: degrees\na,alpha,d,theta\n0,0,0,0\n", "unknown key in a table: found 'anlges'"),
+        (
+            'a,alpha,d,theta\n"0,3",0,0,0\n',
+            "row 1, a: this is not a number: found '0,3'; separate cells",
+        ),
+        ("a;alpha;d;phi\n0;0;0;0\n", "header: the table has no column 'theta'"),
+        ("a [mm],alpha_i,x,theta\n0,pi/2,0.1,0\n", "header: the table has no column 'd'"),
+        ("a;alpha;d;theta\n0;q1;0;0\n", "joint variable belongs in theta of a revolute joint, or in d"),
+        ("a;alpha;d;theta\n0;0;0;q7\n", "row 1, theta: no row has the joint variable that this row mimics"),
+        ("a;alpha;d;theta\n0;0;0;90 deg rad\n", "deg and rad in one cell"),
+        ("a;alpha;d;theta\n90 deg;0;0;0\n", "row 1, a: a must be a length"),
+    ],
+)
+def test_a_wrong_csv_says_where_and_what(text: str, message: str, tmp_path: Path) -> None:
+    assert message in refused(tmp_path, f"# convention: standard\n{text}", ".csv")
+
+
+@pytest.mark.parametrize("rows", [UR5, [[0.1, 0.7, 0.2, "pi/2"]], [[0, 0, 0.3, 0.5236], [0.4, "pi", 0, 0]]])
+def test_a_right_list_is_no_other_order(rows: list[list[Any]]) -> None:
+    assert len(table_from_rows(rows, "standard").rows) == len(rows)
+
+
+def test_lengths_hold_for_base_tool_limits_and_followers() -> None:
+    data = {
+        "convention": "standard", "angles": "degrees", "lengths": "millimetres",
+        "base": [[1, 0, 0, 100], [0, 1, 0, 0], [0, 0, 1, 250]],
+        "tool": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 107], [0, 0, 0, 1]],
+        "rows": [
+            {"joint": "turn", "a": 400, "limit": {"lower": -90, "upper": 180, "velocity": 90}},
+            {"joint": "slide", "kind": "P", "limit": {"lower": -50, "upper": 500}},
+            {"joint": "follow", "kind": "P", "mimic": {"leader": "slide", "offset": 10, "multiplier": 2}},
+        ],
+    }  # fmt: skip
+    table = table_from_mapping(data)
+    assert table.base[:3, 3].tolist() == [0.1, 0.0, 0.25]
+    assert table.tool[:3, 3].tolist() == [0.0, 0.0, 0.107]
+    turn, slide, rule = present(table.rows[0].limit), present(table.rows[1].limit), table.rows[2].mimic
+    assert (turn.lower, turn.upper, turn.velocity) == (-math.pi / 2, math.pi, math.pi / 2)
+    assert (slide.lower, slide.upper) == (-0.05, 0.5)
+    assert (present(rule).multiplier, present(rule).offset) == (2.0, 0.01)
+
+
+def test_lists_arrays_and_short_names_of_units_are_understood() -> None:
+    rows = np.array([[0.4, 0.0, 0.1, 0.0], [0.3, np.pi / 2, 0.0, 0.0]])
+    for written in (rows, list(rows), [[np.float32(0.5), np.int64(0), 0, 0]]):
+        table = table_from_rows(written, "standard")
+        assert table.rows[0].a == float(np.asarray(written)[0, 0])
+    table = table_from_rows([[400, 90, 0, 45]], "standard", angles="deg", lengths="mm")
+    assert table.rows[0].cells == (0.4, math.pi / 2, 0.0, math.pi / 4, 0.0)
+    mixed = table_from_rows([[400, "pi/2", 0, 10.5]], "standard", angles="degrees")
+    assert (mixed.rows[0].alpha, mixed.rows[0].theta) == (math.pi / 2, math.radians(10.5))
+
+
+def test_a_leader_elsewhere_on_the_robot_is_a_coordinate_and_survives_being_written() -> None:
+    robot = load("panda")
+    table = robot.dh("panda_rightfinger", "panda_link0")
+    names = {row.joint for row in table.rows}
+    assert [name for name in table.joint_names if name not in names] == ["panda_finger_joint1"]
+    q = robot.sample(20)
+    for form in ("toml", "json", "csv"):
+        text = export(table, form)
+        again = table_from_text(text, f".{form}")
+        assert again.joint_names == table.joint_names
+        own = table.coupling.select(robot.tree, q)
+        np.testing.assert_array_equal(again.placement(own), table.placement(own))
+        mistyped = text.replace('leader": "panda_finger_joint1', 'leader": "panda_finger_joint2').replace(
+            'leader = "panda_finger_joint1', 'leader = "panda_finger_jointl'
+        )
+        if mistyped != text:
+            with pytest.raises((UnknownNameError, InputError)):
+                table_from_text(mistyped, f".{form}")
+
+
+# -- any type at any key --------------------------------------------------------------------------------
+
+_GOOD: dict[str, Any] = {
+    "convention": "standard", "angles": "radians", "lengths": "metres", "robot": "r", "base_frame": "b",
+    "tip_frame": "t", "base": np.eye(4).tolist(), "tool": np.eye(4).tolist(), "coordinates": ["far"],
+    "rows": [
+        {"joint": "j1", "kind": "R", "a": 0.1, "alpha": 0.2, "d": 0.3, "theta": 0.4, "beta": 0.0, "sense": 1,
+         "limit": {"lower": -1, "upper": 1, "velocity": 1, "effort": 1}},
+        {"joint": "j2", "a": 0.1, "mimic": {"leader": "j1", "multiplier": 2, "offset": 0.5}},
+        [0.1, "pi/2", 0.3, 0.0, "P"],
+    ],
+}  # fmt: skip
+_WORDS = ["pi", "-pi/2", "R", "P", "j1", "j2", "degrees", 10**400, -(10**400), "1e999", "pi/0"]
+_SCALAR = (
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5) | st.sampled_from(_WORDS)
+)
+_FLAT = _SCALAR | st.lists(_SCALAR, max_size=4) | st.dictionaries(st.text(max_size=5), _SCALAR, max_size=3)
+_ANYTHING = _FLAT | st.lists(_FLAT, max_size=4)
+
+
+def _places(data: Any, here: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    keys = data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ()
+    return [here] * bool(here) + [place for key in keys for place in _places(data[key], (*here, key))]
+
+
+_PLACES = _places(_GOOD)
+
+
+@pytest.mark.slow
+@given(st.lists(st.tuples(st.sampled_from(_PLACES), _ANYTHING), min_size=1, max_size=3))
+@settings(max_examples=600)
+def test_anything_at_any_place_is_a_table_or_an_error_of_ours(
+    changes: list[tuple[tuple[Any, ...], Any]],
+) -> None:
+    data = json.loads(json.dumps(_GOOD))
+    for place, value in changes:
+        inside = data
+        try:
+            for key in place[:-1]:
+                inside = inside[key]
+            inside[place[-1]] = value
+        except (TypeError, KeyError, IndexError):
+            continue
+    try:
+        table = table_from_text(json.dumps(data), ".json")
+    except UrdfkinError:
+        return
+    assert np.isfinite(table.placement(np.zeros(len(table.joint_names)))).all()
+
+
+@pytest.mark.slow
+@given(st.text(max_size=60), st.sampled_from([".toml", ".json", ".csv"]))
+@settings(max_examples=300)
+def test_any_text_is_a_table_or_an_error_of_ours(text: str, suffix: str) -> None:
+    for head in ("", "# convention: standard\na,alpha,d,theta\n", 'convention = "standard"\n'):
+        with contextlib.suppress(UrdfkinError):
+            table_from_text(head + text, suffix)
+
+
+def test_nesting_without_end_is_an_error_of_ours() -> None:
+    for suffix, text in ((".json", "[" * 200_000), (".toml", f"rows = {'[' * 20_000}")):
+        with pytest.raises(InputError, match="not valid"):
+            table_from_text(text, suffix)
+
+
+def test_digits_are_read_from_every_shipped_reference() -> None:
+    for path in references().values():
+        found = last_digits(read_mapping(path))
+        assert len(found) == len(read_table(path).rows)
+        assert all(0.0 <= half <= 0.05 for row in found for half in row.values())
