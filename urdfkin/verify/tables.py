@@ -132,8 +132,9 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
         _, longer = _measured(differences, size.of_length(own), slack)
         loss = _loss(table) if max(longer.values()) <= 1.0 else None
-    worst = (float(x.max(initial=0.0)) for x in differences["placement"])
-    return TableCheck(len(own_q), *worst, units, shares, bool(table.snap and table.snap.changes), loss)
+    metres, radians = (float(x.max(initial=0.0)) for x in differences["placement"])
+    snapped = bool(table.snap and table.snap.changes)
+    return TableCheck(len(own_q), metres, radians, units, shares, snapped, loss)
 
 
 def own_length(table: DHTable) -> float:
