@@ -62,7 +62,8 @@ def test_a_robots_calls_give_what_pinocchio_gives_when_asked_directly(
     name: str, reference: Reference
 ) -> None:
     robot = loaded(urdf_of(name), verify=False)
-    assert_agrees(robot, *(x[0] for x in rates(robot, 1, 3)), robot.tip_frame, reference, is_odd=True)
+    q, v, a = (x[0] for x in rates(robot, 1, 3))
+    assert_agrees(robot, q, v, a, robot.tip_frame, reference, is_odd=True)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -136,7 +136,7 @@ class Matrix:
 
 
 class Strong(str):
-    """A sentence with emphasis; `style` is its style on a terminal, such as "bold red"."""
+    """A sentence with emphasis, and with a style for terminals, such as "bold red"."""
 
     __slots__ = ("style",)
     style: str
@@ -224,7 +224,7 @@ def _html(words: str) -> str:
 
 
 def six_digits(value: float, noise: float = NOISE, digits: int = 6) -> str:
-    """Format a number with `digits` significant digits; return "0" if its absolute value is at most `noise`.
+    """Format a number with `digits` significant digits; absolute values up to `noise` become "0".
 
     >>> six_digits(0.1 + 0.2), six_digits(1e-16), six_digits(1e-16, noise=0.0)
     ('0.3', '0', '1e-16')

@@ -1,7 +1,7 @@
 """Strict parsing of numbers, and of numbers with units.
 
 `parse_float` and `parse_int` accept finite numbers in decimal ASCII digits only: the grammar of `xs:double`
-without its special values. Python's `float` also accepts `1_0`, Arabic digits, `nan` and `infinity`.
+without NaN and infinity. Python's `float` also accepts `1_0`, Arabic digits, `nan` and `infinity`.
 `parse_quantity` parses a number with a unit: `30deg`, `pi/2`, `5 mm`, `-2*pi/3`, `90 deg/s`.
 """
 
@@ -75,7 +75,7 @@ _LONGEST_QUANTITY = 200
 
 
 class ParsedNumber(NamedTuple):
-    """A number in radians or metres if its text has a unit.
+    """A parsed number; a number with a unit is converted to radians or metres.
 
     Attributes:
         unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.

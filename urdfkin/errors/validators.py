@@ -1,4 +1,4 @@
-"""Validators of arguments: each returns the value in its proper type or raises an InputError."""
+"""Validators of arguments; a validator returns the value in the proper type, or raises InputError."""
 
 from __future__ import annotations
 

@@ -601,8 +601,7 @@ class Robot(Displayable):
 
         Args:
             mimic: True: the mimic joints follow their mimic rules, which Pinocchio 4.1 rejects for some
-                robots.
-                False: each mimic joint is an independent joint.
+                robots. False: each mimic joint is an independent joint.
 
         Raises:
             OracleError: Pinocchio does not accept this robot.
@@ -741,8 +740,8 @@ class Robot(Displayable):
 
         Raises:
             UnknownNameError: the quantity or the frame does not exist.
-            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast,
-                the wrong number of inputs, or a quantity that only its own method computes.
+            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, the
+                wrong number of inputs, or a quantity that only its own method computes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -911,9 +910,9 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the kinematic Hessian H (..., 6, nv, nv), the derivative of `jacobian` by each coordinate.
 
-        H[..., i, j] is the derivative of column i of J in the direction of the joint velocity j. J-dot of
-        eq. 7.126 is the sum of H[..., j] v[j] over j. v^T H v is the part of the acceleration that depends on
-        v alone.
+        H[..., i, j] is the derivative of column i of J in the direction of the joint velocity j. J-dot of eq.
+        7.126 is the sum of H[..., j] v[j] over j. v^T H v is the part of the acceleration that depends on v
+        alone.
 
         - Joint j before joint i: z_j rotates the column, z_j x (z_i x d_i).
         - Joint j after joint i: z_j moves the end of the lever arm, z_i x (z_j x d_j).

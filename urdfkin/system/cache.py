@@ -4,7 +4,7 @@ urdfkin executes or unpickles cached files, so another user's file could run any
 used only if no other user can write to it. The name of a folder contains a digest of the source files, so a
 changed source file leads to another folder. A folder that urdfkin has not used for a month is deleted.
 
-A truncated or corrupted file could crash the process or compute a wrong result, so it is reported and
+A truncated or corrupted file could crash the process or cause a wrong result, so such a file is reported and
 replaced. The checksum includes the names of the file and of the folder, because a renamed file could belong
 to another robot.
 """
@@ -133,7 +133,7 @@ def put(place: Path, data: bytes) -> None:
 
 
 def get(place: Path) -> bytes | None:
-    """Return the content of a file that `put` wrote; None if it is missing or, with a warning, damaged."""
+    """Return the content of a file that `put` wrote; None for a missing or, with a warning, damaged file."""
     try:
         content = read_if_there(place, MOST_DATA)
     except SourceError as error:
@@ -156,5 +156,5 @@ def _checksum(place: Path, data: bytes) -> bytes:
 
 
 def report_damaged(place: Path, reason: str) -> None:
-    """Warn that a cached file is damaged and that its content is computed again."""
+    """Warn that a cached file is damaged, and that urdfkin computes the content again."""
     say_once(f"{place} is damaged and is computed again: {reason}")

@@ -1,7 +1,7 @@
 """JSON documents: their common header, their schemas, and functions that read and write them.
 
-A `TypedDict` defines the entries of a document. urdfkin generates the JSON Schema of the document from the
-`TypedDict`, and checks documents from files against it. `plain` turns results into documents.
+A `TypedDict` defines the entries of a document. urdfkin generates the document's JSON Schema from the
+`TypedDict`, and uses the `TypedDict` to check documents from files. `plain` turns results into documents.
 """
 
 from __future__ import annotations

@@ -46,7 +46,8 @@ def installed_version(package: str) -> str | None:
         for name in os.listdir(entry):  # noqa: PTH208  the function of pathlib is slower
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    # An earlier import would let a file in the current folder replace modules that `metadata` imports.
+    # `metadata` imports many modules, which files in the current folder could replace at the start of
+    # urdfkin.
     from importlib import metadata
 
     try:

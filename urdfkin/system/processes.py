@@ -1,8 +1,8 @@
 """Child processes, and threads with a large stack.
 
-Child processes of urdfkin do not import from the current folder, which may contain untrusted robots. `python
--c` and `python -m` search the current folder first, so a file `json.py` beside a robot would be run.
-Libraries also search the current folder for settings files.
+The current folder may contain untrusted files. Python's options -c and -m search the current folder for
+modules first, so a file `json.py` beside a robot would be run. Child processes of urdfkin therefore do not
+import from the current folder. Libraries also search the current folder for settings files.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _is_scratch(entry: str) -> bool:
 
 
 def ask_python(command: list[str], request: bytes, patience: float, most: int) -> tuple[bytes, int | None]:
-    """Run a process with a minimal environment, write a request to its standard input and read its output.
+    """Run a process with a minimal environment, and with a request on standard input.
 
     The process is killed after `patience` seconds, and after more than `most` bytes of output.
 

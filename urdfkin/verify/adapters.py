@@ -1,7 +1,7 @@
 """Read a robot file with other libraries, with one adapter for each library.
 
-The module imports only NumPy and the chosen library. The command `urdfkin readers` imports the module, and
-`scripts/make_libraries.py` runs it as a program, with the Python of an environment that contains one library:
+This module imports only NumPy and the chosen library. The command `urdfkin readers` imports this module.
+`scripts/make_libraries.py` runs this module as a program, with the Python of an environment with one library:
 
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
@@ -106,7 +106,7 @@ def _relative(poses: Poses, root: str) -> Poses:
 
 
 def read_pinocchio(text: str) -> Reading:
-    """Read a URDF with Pinocchio; `mimic=True` couples its mimic joints."""
+    """Read a URDF with Pinocchio, with coupled mimic joints."""
     import pinocchio as pin
 
     if _is_path(text):
@@ -402,7 +402,7 @@ class Library:
         title: Name of the library in tables.
         package: The name that pip installs.
         module: The module that is imported.
-        read: Its adapter.
+        read: The adapter.
         forms: File formats that the adapter can read.
         single: Whether the library computes in single precision.
     """

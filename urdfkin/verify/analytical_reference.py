@@ -1,7 +1,7 @@
 """Compute analytical Jacobians (eq. 7.122) from a rotation matrix and a velocity Jacobian, without any angle.
 
-The module checks `urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`, and shares no code with them.
-Its functions also accept arrays of fifty-digit numbers, for the accuracy study.
+The results check `urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`, which share no code with this
+module. The functions also accept arrays of fifty-digit numbers, for the accuracy study.
 """
 
 from __future__ import annotations

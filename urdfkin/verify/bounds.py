@@ -5,8 +5,8 @@ A result is accepted if each of its numbers differs from the oracle's number by 
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
-terms (`magnitudes`), in the unit of the number. Two computations may add the same terms in different orders.
-The difference of their results is proportional to the scale, not to the sum itself.
+terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. The
+difference of the two sums is proportional to the scale, not to the sums.
 
 *k* is the number of roundings to first order in eps (`urdfkin.kinematics.roundings`). Each joint on the path
 adds a fixed number of roundings. A joint also rotates the vectors of the joints after it, but a rotation does
@@ -28,13 +28,14 @@ The references LOCAL and WORLD need one more factor: a rotation into the frame's
 product with p (WORLD).
 
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
-worst way. Reports state differences in multiples of eps * scale, which can be compared between robots.
+worst way. Reports state differences in multiples of eps * scale, because such multiples of different robots
+can be compared.
 
 *Magnitudes.* `magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with the lengths of vectors instead of the
-vectors (`urdfkin.kinematics.number_kinds`). No intermediate value exceeds the result. Eq. 7.129 contains the
-term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The difference v_i^2 z x z is 0 except for rounding
-errors, which matter for fast joints with an oblique axis. The bound on the angular acceleration alpha
-therefore uses w_i instead of w_{i-1}.
+vectors (`urdfkin.kinematics.number_kinds`), so no intermediate value exceeds the result. Eq. 7.129 contains
+the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The difference v_i^2 z x z is 0 except for
+rounding errors, which are large for fast joints with an oblique axis. The bound on the angular acceleration
+alpha therefore uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -163,7 +164,7 @@ def _rows(columns: Sequence[FloatArray]) -> FloatArray:
 
 
 class _MovingJoint(NamedTuple):
-    """A moving joint of a compiled tree; `multiplier` and `offset` are absolute values of its mimic rule."""
+    """A moving joint of a compiled tree, with the absolute values of the mimic multiplier and offset."""
 
     kind: int
     q: int
@@ -180,7 +181,7 @@ class _End(NamedTuple):
     Attributes:
         step: Index of the last moving joint before the frame.
         frame: Index of the frame in the output.
-        length: Length of the path from this joint to the frame, m.
+        length: Length of the path from the joint `step` to the frame, m.
     """
 
     step: int
@@ -351,9 +352,9 @@ def against_true_values(
 
     The true values are computed from the decimals in the URDF and from the doubles q, v and a, and are
     rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One program makes
-    at most 16.8 of these (`urdfkin.kinematics.roundings`). The remaining 7.2 cover the conversion of decimals
-    to doubles: half an eps each for the offset, the axis and the true value; the axis counts twice, because
-    two rotations use it. Two kinds of numbers need additional roundings:
+    at most 16.8 rounding errors (`urdfkin.kinematics.roundings`). The remaining 7.2 cover the conversion of
+    decimals to doubles: half an eps each for the offset, the axis and the true value; the axis counts twice,
+    because two rotations use the axis. Two kinds of numbers need additional roundings:
 
     - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint rotate by
       at most (|roll| + |pitch| + |yaw|) / 2 eps.
@@ -367,8 +368,8 @@ def against_true_values(
     This rule has r - 1 sums in C, and the sum of M q and C. No sum exceeds X, so the combined rule adds an
     error of at most (r - 1) / 2 X eps; all other rounding errors are those of the separate rules.
 
-    *Revolute mimic joint.* An error of its value rotates all later vectors of the path. An angle error of
-    1 eps rad changes a vector by at most eps times the length of the vector.
+    *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
+    error of 1 eps rad changes a vector by at most eps times the length of the vector.
 
     *Prismatic mimic joint.* Each term of X is rounded at most 3 r times, so the displacement has an error of
     at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain cancel each
@@ -402,10 +403,10 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
-    *Lengths.* In an MJCF file, the offset of a body is the sum of the body's `pos`, the `pos` of its joints,
-    and a vector for the `ref` of a slide joint. urdfkin adds these vectors once, when it reads the file.
-    MuJoCo adds them for each configuration. A single vector can be longer than the sum, so the scale of
-    positions is the larger of the length of the path and `lengths`.
+    *Lengths.* In an MJCF file, the offset of a body is the sum of the body's `pos`, the `pos` of the joints,
+    and a vector for the `ref` of a slide joint. urdfkin adds these vectors once, when reading the file.
+    MuJoCo adds the vectors for each configuration. A single vector can be longer than the sum, so the scale
+    of positions is the larger of the length of the path and `lengths`.
 
     *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref; urdfkin rotates the hinge by ref and by q
     separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
@@ -443,12 +444,11 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     *Breakdown.* The scale is also valid for the sum of the contributions in an `AccelerationBreakdown`. Let
     d_k be the vector from joint k to the frame, and w_k the sum of the joint velocities up to joint k.
 
-    - The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have together at most the length
-      (w_k^2 - w_{k-1}^2) d_k. The sum over all joints is the sum of w_k^2 times the length of link k, as in
-      eq. 7.130.
+    - The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have together at most the length (w_k^2 -
+      w_{k-1}^2) d_k. The sum over all joints is the sum of w_k^2 times the length of link k, as in eq. 7.130.
     - A vector d_k is the sum of the vectors between successive joint origins, with the rounding errors of the
       sums in eq. 7.77.
-    - For n joints, the breakdown has 4 n terms. Adding them causes n + 3 rounding errors.
+    - For n joints, the breakdown has 4 n terms, whose sum has n + 3 rounding errors.
     - The bound allows 2 eps for the sums at each joint, more than the rounding errors of d_k and of 4 n
       terms.
     """
@@ -490,8 +490,8 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
     The linear rows of a revolute joint's column are z x d. The vector d is at most as long as the path to the
-    frame, and its derivative is at most the bound on the velocity of the frame's origin. In LOCAL, J-dot is
-    the derivative of components along the frame's axes, which rotate.
+    frame, and the derivative of d is at most the bound on the velocity of the frame's origin. In LOCAL, J-dot
+    is the derivative of components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -524,7 +524,7 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     never longer than the path.
 
     Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin. `_PAIR_TERMS`
-    contains sums of the numbers of these products:
+    contains sums of the numbers of products:
 
     - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
     - one to move the result to the frame's origin p, p x (w_1 x w_2)
@@ -568,13 +568,13 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     | first or last angle | r . w, r is the reciprocal basis vector of the axis | 1 / s |
 
     Let delta = k eps be the error of t, and also the relative error of w. The error of t rotates u by at most
-    delta / s. It changes r by the vector -(r . du) u - (r . dt) r', where r' is the reciprocal vector of t.
-    This vector is at most 2 delta / s^2 long. The errors of the rows are:
+    delta / s. The error of t changes r by the vector -(r . du) u - (r . dt) r', which is at most 2 delta /
+    s^2 long; r' is the reciprocal vector of t. The errors of the rows are:
 
     - first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
 
-    The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. Its scale is therefore
+    The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. For s, the
     function uses the smallest possible value, `apart` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. The bound includes these errors, because
@@ -598,10 +598,10 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound (n, frames, 7, nv) of analytical Jacobians with quaternions, which are never singular.
 
     The rows of positions have the bound of the velocity Jacobian. Let delta be the error of R. The elements
-    of the matrix 4 q q^T are linear functions of R. Its longest row has a length of at least 2 and an error
-    below 4.6 delta, so the error of q is below 2.3 delta. The derivative of q is half the quaternion product
-    of w and q, with an error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|, the bound on the
-    angular velocity in the velocity Jacobian.
+    of the matrix 4 q q^T are linear functions of R. The longest row of this matrix has a length of at least 2
+    and an error below 4.6 delta, so the error of q is below 2.3 delta. The derivative of q is half the
+    quaternion product of w and q, with an error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|,
+    the bound on the angular velocity in the velocity Jacobian.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 

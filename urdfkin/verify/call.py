@@ -35,7 +35,7 @@ class Part(NamedTuple):
         q: (n, nq).
         rates: Arrays (n, nv): () for a placement, (v,) for a velocity, (v, a) for an acceleration.
         state: (n or 1, 24) state of the moving base.
-        query: These n configurations for the oracle, converted from the user's arguments.
+        query: The n configurations for the oracle, converted from the user's arguments.
         options: Other arguments of the method, by name.
     """
 

@@ -34,8 +34,8 @@ class VerificationError(UrdfkinError):
         frame: Name of the frame.
         reference: Reference frame; for an analytical Jacobian, the representation.
         index: Index of the worst sample in the batch.
-        ours: urdfkin's result for that sample.
-        theirs: The oracle's result for that sample.
+        ours: urdfkin's result for the worst sample.
+        theirs: The oracle's result for the worst sample.
         bound: Largest allowed difference between `ours` and `theirs`, for each number of the result.
         units: The difference between `ours` and `theirs` in multiples of eps * scale.
         reproduce: A shell command or a line of Python that computes the sample again.
@@ -273,7 +273,7 @@ class Account:
 
 @dataclass
 class Ledger:
-    """Counts the checked and the unchecked results of a robot; several threads may use the same ledger."""
+    """Counts the checked and the unchecked results of a robot, from any number of threads."""
 
     _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)

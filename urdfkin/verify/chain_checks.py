@@ -28,12 +28,12 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare the joints and the tip of a chain with Pinocchio at q (n, nq).
 
-    Pinocchio's frame of a joint is the frame of the child link. A chain from the parent link to the child
-    link reaches this frame after the motion of the joint, and a chain from the child link to the parent link
-    before the motion.
+    Pinocchio's frame of a joint is the frame of the child link. A chain towards the tips reaches this frame
+    after the motion of the joint, and a chain towards the root before the motion.
 
-    The bound counts all joints and lengths of the two paths from the root to the first and to the last frame
-    of the chain. Pinocchio computes along these paths, and urdfkin along the chain, which is a part of them.
+    Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
+    computes along the chain, which is a part of the two paths. The bound counts all joints and lengths of
+    both paths.
 
     Raises:
         TableError: the chain and Pinocchio differ by more than rounding.

@@ -1,7 +1,7 @@
 """Compare results with an oracle's, in multiples of eps * scale and as a fraction of the bound.
 
-`disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes the same
-differences in one pass, because NumPy would take as long as Pinocchio itself.
+`disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes these
+differences in one pass, because NumPy would take as long as Pinocchio.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ class BatchComparison:
     index: tuple[int, ...] = ()
 
     def __add__(self, other: BatchComparison) -> BatchComparison:
-        """Combine the comparisons of two batches; `index` is that of the batch with the larger `share`.
+        """Combine the comparisons of two batches, with the `index` of the batch with the larger `share`.
 
-        A ratio `share` of NaN counts as larger than any number.
+        A `share` of NaN counts as larger than any number.
         """
         second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
         first, second = (other, self) if second_is_larger else (self, other)
@@ -75,7 +75,7 @@ def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The result is inf if one of the three numbers is not finite, or if two different numbers have the scale 0.
+    The result is inf if `ours`, `theirs` or `scale` is not finite, or if different numbers have the scale 0.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, LEAST_UNIT), 0.0)
     difference = np.abs(ours - theirs)

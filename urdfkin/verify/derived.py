@@ -45,7 +45,7 @@ def check_analytical_jacobian(
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs = quaternion_jacobian(quat, J_v)
         # q and -q are the same rotation; urdfkin and the oracle return the quaternion with qw >= 0.
-        # If |qw| is below its rounding error, urdfkin's sign is accepted.
+        # If |qw| is below the rounding error, the sign of urdfkin's quaternion is accepted.
         opposite = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         flipped = opposite & (np.abs(quat[..., 3]) <= bounds.hidden_scalar(bound, quat.shape[:-1]))
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]

@@ -83,9 +83,9 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each three numbers with a common scale to `units`.
+    """Write the largest difference of each three numbers with a common scale to `units`, in eps * scale.
 
-    A difference is in multiples of eps * scale, and may be NaN or inf.
+    The difference may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -120,7 +120,7 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     Args:
         ours: urdfkin's results.
         theirs: The oracle's results.
-        scale: Scale of the bound. If it has fewer rows than `out`, its rows are repeated.
+        scale: Scale of the bound. Its rows are repeated if `scale` has fewer rows than `out`.
         out: The largest difference in each row.
         out_bits: View of `out` as 64-bit integers.
         unit: Working memory in the shape of `scale`, used only if `scale` has fewer rows than `out`.

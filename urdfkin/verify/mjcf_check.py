@@ -3,10 +3,10 @@
 Pinocchio checks every result with the URDF text that urdfkin writes for the tree, but not the conversion from
 the MJCF file to the tree. `load` therefore makes three comparisons:
 
-- the placements of bodies and sites with those of MuJoCo's own model of the file
+- the placements of bodies and sites with those of MuJoCo's model of the file
 - the mimic rules with the joint equalities of MuJoCo's model
-- the placements with those of Pinocchio's MJCF reader. A difference is only reported, because Pinocchio's
-  reader is known to read some files differently.
+- the placements with those of Pinocchio's MJCF reader, which reads some files differently. A difference from
+  Pinocchio is reported, but is not an error.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # The factor 2 allows as much again for the rounded angles in the URDF text.
+    # The factor 2 doubles the bound to allow for the rounded angles in the URDF text.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -197,7 +197,7 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _placements(found: Mapping[str, Any]) -> FloatArray:
-    """Return placements (n, frames, 4, 4) from their upper three rows."""
+    """Return placements (n, frames, 4, 4) from an array of the upper three rows."""
     rows = unpacked(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0

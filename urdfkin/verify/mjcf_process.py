@@ -70,7 +70,7 @@ def error_answer(error: Exception, what: str) -> dict[str, Any]:
 
 
 def _with_memory_hint(found: str | None) -> str | None:
-    """Add a hint to "unknown exception", which MuJoCo reports if memory is lacking."""
+    """Add a hint about memory to the message "unknown exception" of MuJoCo."""
     return f"{found} Perhaps {_TOO_MUCH}" if found and found.endswith("unknown exception!") else found
 
 
@@ -88,7 +88,7 @@ def parse_answers(
 
     Args:
         output: Output of the process.
-        status: Exit status of the process; None: it ran longer than `patience`.
+        status: Exit status of the process; None: the process ran longer than `patience`.
         library: Name of the library in messages.
         name: Name of the file in messages.
         patience: Time limit, s.

@@ -51,7 +51,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # The factor 2 allows as much again for the rounded angles in the URDF text.
+    # The factor 2 doubles the bound to allow for the rounded angles in the URDF text.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:

@@ -1,8 +1,8 @@
 """The oracle MuJoCo.
 
-MuJoCo reads the origins and axes of joints from the URDF text with its own parser. It computes with unit
-quaternions, and its six-vectors refer to a centre of mass. Neither urdfkin nor Pinocchio uses these methods.
-This module changes the text before MuJoCo reads it:
+MuJoCo reads the origins and axes of joints from the URDF text with its own parser. Unlike urdfkin and
+Pinocchio, MuJoCo computes with unit quaternions, and its six-vectors refer to a centre of mass. This module
+changes the text before MuJoCo reads it:
 
 - Each link becomes a body. Meshes and inertials are removed, and only the root has a mass. The centre of
   mass, to which MuJoCo's results refer, is therefore the root's origin.
@@ -67,8 +67,8 @@ class _Joint:
 class _MujocoIndices:
     """Indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
 
-    The joint of a moving base has q = v = -1, because it is not in urdfkin's q and v. A locked joint has v =
-    -1, and its value is the offset.
+    The joint of a moving base, which is not in urdfkin's q and v, has q = v = -1. A locked joint has v = -1,
+    and the offset is the value of the joint.
     """
 
     kind: str
@@ -154,7 +154,7 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        if kind == "prismatic":  # MuJoCo requires limits, although its kinematics ignores them
+        if kind == "prismatic":  # MuJoCo requires limits, but ignores limits in its kinematics
             SubElement(element, "limit", lower="-1", upper="1")
         return element
 
@@ -323,7 +323,8 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The slide joints of the base are in world axes; its ball joint is in the axes of the base.
+            # The velocity of the base's slide joints is in world axes, that of the ball joint in the base's
+            # axes.
             at, back = self._indices[0].qvel, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]

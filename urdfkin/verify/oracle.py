@@ -78,7 +78,7 @@ def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     for joint in rules:
         chain = [joint]
         while (leader := rules[chain[-1]].leader) in rules and leader not in known:
-            if len(chain) > len(rules):  # a cycle, which the check of the file reports
+            if len(chain) > len(rules):  # the rules form a cycle
                 break
             chain.append(leader)
         for name in reversed(chain):
@@ -134,14 +134,13 @@ class PinocchioLayout:
     Args:
         model: Pinocchio's model.
         joints: Pinocchio's indices of the robot's joints, in order.
-        names: Names of these joints.
+        names: Names of the joints, in the order of `joints`.
         rules: The resolved rule of each mimic joint.
 
     Attributes:
         nq: Length of q.
         nv: Length of v.
-        rate_columns: Indices of the columns of Pinocchio's Jacobian that belong to moving joints, including
-            mimic joints.
+        rate_columns: Indices of the columns of Pinocchio's Jacobian for moving joints, mimic joints included.
     """
 
     def __init__(
@@ -164,7 +163,7 @@ class PinocchioLayout:
             full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
             self._joints.append(_JointIndices(size, *full, *at[rule.leader], rule.multiplier, rule.offset))
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
-        #: For each Pinocchio joint velocity: its index in v, and its factor in G; 0 for the base.
+        #: Index in v and factor in G of each Pinocchio joint velocity; 0 for the base.
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
         for joint in self._joints:
             for c in range(joint.sizes[1]):
@@ -324,12 +323,12 @@ def free_flyer(base: BaseNumbers) -> FloatArray:
 
 
 def free_flyer_rates(base: BaseNumbers) -> FloatArray:
-    """Return the base's velocity in its own axes, (..., 6)."""
+    """Return the base's velocity in the axes of the base, (..., 6)."""
     return _in_own_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
 
 
 def free_flyer_second_rates(base: BaseNumbers) -> FloatArray:
-    """Return the base's spatial acceleration, acc - w x vel, in its own axes, (..., 6)."""
+    """Return the base's spatial acceleration, acc - w x vel, in the axes of the base, (..., 6)."""
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
     return _in_own_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
@@ -347,7 +346,7 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
 
 
 def davenport(M: NDArray[Any]) -> NDArray[Any]:
-    """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); for a rotation it is 4 q q^T - I."""
+    """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); K = 4 q q^T - I for a rotation M."""
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
     trace = np.trace(M, axis1=-2, axis2=-1)
@@ -445,8 +444,7 @@ class QueryBatch(NamedTuple):
     Attributes:
         frames: Names of the frames, as the user gave them. If `joints` is True, the frames are `JointFrame`
             objects.
-        inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv). A method of an oracle may need only the
-            first of them.
+        inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv).
         reference: Reference frame, as the user gave it; without effect on placements.
         base: Motion of the base; None: fixed at the world origin.
         joints: True: use the library's functions for joints, if the library has such functions.
@@ -582,11 +580,11 @@ class Oracle:
 
     Args:
         text: The URDF text.
-        tree: urdfkin's tree of the same text. An oracle uses only its joints, for a comparison.
+        tree: urdfkin's tree of the text. An oracle uses only the joints of the tree, for a comparison.
         mimic: True: couple mimic joints. False: every mimic joint moves freely.
         moving_base: Build the model on a free-flyer, which receives the base's motion.
-        root_joint: Kind of a root joint that urdfkin has added to the tree: "floating" or "planar". The
-            URDF text does not contain this joint. None: urdfkin has added no joint.
+        root_joint: Kind of the root joint that urdfkin has added to the tree, "floating" or "planar", and
+            that the text does not contain; None: urdfkin has added no joint.
         lock: Value (rad or m) of each locked joint, which is a fixed joint in the tree.
 
     Attributes:
@@ -687,8 +685,8 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
     Args:
         full: J_full (..., columns).
         columns: Columns of J_full to add, in this order.
-        index: For each column of J_full, its index in v.
-        factor: For each column of J_full, the nonzero element of G.
+        index: Index in v of each column of J_full.
+        factor: Nonzero element of G for each column of J_full.
         nv: Length of v.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])

@@ -138,8 +138,8 @@ def build_model(
 ) -> Any:
     """Return Pinocchio's model of a URDF text.
 
-    A robot that needs too much memory, or a chain of links that needs too much stack, would crash the
-    process. The first is rejected, and the second is parsed with a larger stack.
+    Pinocchio would crash the process for a robot that needs too much memory, or for a long chain of links.
+    The robot is rejected; the chain is parsed with a larger stack.
 
     Args:
         text: The URDF text.
@@ -344,7 +344,7 @@ class PinocchioOracle(Oracle):
 
         Two errors of Pinocchio 4.1 are corrected:
 
-        - The returned NumPy array has C order, but its numbers are in Eigen's order: the first index varies
+        - The returned NumPy array has C order, but the numbers are in Eigen's order: the first index varies
           fastest.
         - In LOCAL, entries [i, j] of two velocities i and j of the same joint may differ from 0. The true
           value is 0, because a joint does not move its own axes relative to the frame.
@@ -410,8 +410,7 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     """Write the results of n configurations to `memory` (rows, frames, ...) in blocks, and yield each block.
 
     If `memory` has fewer than n rows, each block overwrites the previous block. Results without numbers are
-    not
-    computed: for a Jacobian without columns, Pinocchio 4.1 crashes the process.
+    not computed: for a Jacobian without columns, Pinocchio 4.1 crashes the process.
     """
     if 0 in memory.shape:
         yield memory

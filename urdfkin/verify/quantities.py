@@ -69,7 +69,7 @@ class Quantity:
         exact: Function (motion, link, reference) that returns intervals around the true values, for the
             accuracy study and `Robot.enclose`.
         recursive: True if the forward recursion computes the quantity for any frames.
-        validated: True if `validate`, the accuracy study and plots include the quantity. They leave out the
+        validated: True if `validate`, the accuracy study and plots include the quantity. False for the
             Hessian, which has nv times as many numbers as a Jacobian.
         referred: True if the quantity depends on a reference frame. If False, as for the placement, `compute`
             has no argument `reference`.
@@ -135,7 +135,7 @@ class Quantity:
     def ours(
         self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
-        """Return urdfkin's results (n, frames, ...); `inputs` may be longer than necessary."""
+        """Return urdfkin's results (n, frames, ...) for the first of `inputs` (q, v, a)."""
         results: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
         return results
 
@@ -385,7 +385,7 @@ def quantity(name: str) -> Quantity:
 def replay_line(
     origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
 ) -> str:
-    """Return the shell command that computes one case again; its digits determine each number exactly.
+    """Return the shell command that computes one sample again, with all digits of the numbers.
 
     >>> from urdfkin.urdf.sources import Origin
     >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})

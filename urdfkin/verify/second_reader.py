@@ -3,9 +3,9 @@
 Pinocchio checks the computed results. This module checks the data of the robot: links, joint kinds, origins,
 axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-yourdfpy (0.0.60) deviates from the URDF specification in two points, which are reported as known faults and
-not as differences: it ignores the attribute `quat_xyzw` of an origin, and does not normalise axes. For a
-missing number, yourdfpy returns None, which counts as the default value of the specification.
+yourdfpy (0.0.60) has two known faults, which the report separates from other differences: yourdfpy ignores
+the attribute `quat_xyzw` of an origin, and does not normalise axes. For a missing number, yourdfpy returns
+None, which counts as the default value of the URDF specification.
 """
 
 from __future__ import annotations
@@ -31,14 +31,13 @@ from urdfkin.verify.oracle import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Bound on the difference between entries of two rotation matrices that two programs compute from the same
+#: Bound on the difference between entries of rotation matrices that two programs compute from the same
 #: angles.
-#: A sine and a cosine have an error of one eps each; two products and a sum have half an eps each. The sum of
-#: the terms is at most 1.
+#: Errors: one eps each for a sine and a cosine; half an eps each for two products and a sum, which is at most
+#: 1.
 _ROTATION = 9.0 * EPS
-#: Bound on the difference between components of an axis that two programs normalise. The length has an error
-#: of
-#: 2 eps, and the quotient is rounded once.
+#: Bound on the difference between components of an axis that two programs normalise.
+#: The length has an error of 2 eps, and the quotient is rounded once.
 _AXIS = 5.0 * EPS
 #: Largest difference from 1 of the length of a normalised axis.
 _UNIT = 1e-6
@@ -119,7 +118,7 @@ def read(text: str) -> yourdf.Robot:
     """Return yourdfpy's robot of a URDF text without meshes; yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow
 
-    # The encoded text is UTF-8, even if its declaration names another encoding.
+    # The encoded text is UTF-8, even if the removed declaration names another encoding.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
     logger = logging.getLogger("yourdfpy.urdf")
     before, logger.disabled = logger.disabled, True

@@ -2,13 +2,14 @@
 
 - Lost direction: a left null vector u of J. The frame cannot move along u, because u^T J v = 0 for every v.
 - Null motion: a right null vector of J, that is, joint velocities that do not move the frame.
-- Minimal dependent set: linearly dependent columns that become independent if any of them is removed. The
-  joints of these columns cause the loss of rank.
+- Minimal dependent set: linearly dependent columns that become independent if any column is removed. The
+  joints of such columns cause the loss of rank.
 
-A geometric reason, such as parallel axes, is stated only if the columns satisfy its condition within the
-error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the axis, and a
-leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if their columns
-are equal up to sign. An axis passes through the frame's origin if the linear part of its column is 0.
+A geometric reason, such as parallel axes, is stated only if the columns satisfy the condition of the reason
+within the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the
+axis, and a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if
+their columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column
+is 0.
 """
 
 from __future__ import annotations
@@ -28,8 +29,7 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 _LARGEST_SET = 4
 #: Maximum number of columns of a Jacobian that is searched for minimal dependent sets.
 _MOST_COLUMNS = 16
-#: Rounding error of the singular value decomposition of a small matrix, in eps times the number of rows and
-#: columns.
+#: Rounding error of the singular value decomposition of a small matrix, in eps for each row and each column.
 _ROUNDINGS = 16.0
 #: Largest fraction of the norm at which a singular value counts as 0, for random configurations.
 _NEGLIGIBLE = 1e-9
@@ -44,7 +44,7 @@ class FrameColumns:
         error: (..., 6, nv) bound on the error of each number of J.
         frame: Name of the frame.
         joints: (nv,) name of each column.
-        turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint. None
+        turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint, None
             for a column that does not belong to a single joint axis.
         active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
         samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
@@ -63,7 +63,7 @@ class FrameColumns:
 
 
 def axis_kinds(tree: KinematicTree) -> tuple[bool | None, ...]:
-    """Return `FrameColumns.turns` of a robot."""
+    """Return the attribute `turns` of `FrameColumns` for a robot."""
     turns: list[bool | None] = [None] * tree.nv
     moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
     for i, joint in moving:
@@ -84,7 +84,7 @@ class Singularity(Displayable):
         lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
             Jacobian has more rows than columns.
         motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
-        reasons: The lost directions and their reasons, one sentence each.
+        reasons: Sentences about the lost directions and the reasons of the loss.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")

@@ -71,8 +71,8 @@ class TableCheck:
         shares: Ratios of the differences `units` to their bounds; above 1 is a disagreement.
         snapped: True if snapping changed the table, for example from 89.99 to 90 degrees. The bound then
             includes the deviation that the table states.
-        loss: Explanation of a difference above its bound that very large lengths in the table cause; None:
-            no such difference.
+        loss: Explanation of a difference above the bound, if very large lengths in the table cause the
+            difference; else None.
     """
 
     samples: int
@@ -132,8 +132,9 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
         _, longer = _measured(differences, size.of_length(own), slack)
         loss = _loss(table) if max(longer.values()) <= 1.0 else None
-    worst = (float(x.max(initial=0.0)) for x in differences["placement"])
-    return TableCheck(len(own_q), *worst, units, shares, bool(table.snap and table.snap.changes), loss)
+    metres, radians = (float(x.max(initial=0.0)) for x in differences["placement"])
+    snapped = bool(table.snap and table.snap.changes)
+    return TableCheck(len(own_q), metres, radians, units, shares, snapped, loss)
 
 
 def own_length(table: DHTable) -> float:
@@ -167,7 +168,7 @@ def _measured(
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: Scale and slack of the linear and of the angular differences.
+    #: Pairs (scale, slack) for the linear and for the angular differences of each quantity.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, slack.metres), (one, slack.turn)),
         "jacobian": (
@@ -234,9 +235,10 @@ class Sizes:
     Attributes:
         reach: (n,) length of the path from the root to the table's base plus length of the path from the root
             to the table's tip, m.
-        turning: (columns,) sum of |multiplier| for each coordinate of the table, over the revolute joints on
-            the two paths that the coordinate moves.
-        sliding: (columns,) sum of |multiplier| over the prismatic joints instead of the revolute joints.
+        turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves,
+            on the path from the root to the table's base or tip.
+        sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate of the table
+            moves.
         rates: (n,) sum of the absolute values of all joint velocities, rad/s and m/s.
         accelerations: (n,) sum of the absolute values of all joint accelerations, rad/s^2 and m/s^2.
         rounding: (n,) upper bound on the relative error. The bound includes the angles between nearly

@@ -52,8 +52,8 @@ PATIENCE = 60.0
 _ROTATION = 18.0
 #: Number of roundings in a joint's origin (derived in `_check_joint`).
 _ORIGIN = 3.0
-#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE` (derived in
-#: `_compare_prims`).
+#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE`.
+#: `_compare_prims` derives this bound.
 _TRANSFORM = 6.0 * np.pi
 
 
@@ -145,8 +145,7 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
       quaternions adds 4 u to each number. The vector of the four errors has the length 8 u, and the angle
       error is twice this length, 16 u. The sum is `_ROTATION` u.
-    - Origin: `_ORIGIN` roundings, of the scale factor, of its product with the origin, and of the transformed
-      origin.
+    - Origin: `_ORIGIN` roundings, of the scale factor, of the scaled origin, and of the transformed origin.
     """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
@@ -183,8 +182,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five numbers for each joint, by its name, about rounding to single precision
-#: (`urdfkin.urdf.usd.Usd.single`).
+#: Five numbers about rounding to single precision, by the joint's name (`urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -262,10 +260,10 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     operation is at most `_TRANSFORM` u, the largest of these three values:
 
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
-    - Quaternion: the vector of the four errors is at most u long. Its component perpendicular to the
-      quaternion changes the rotation by at most 2 u. Its parallel component changes the length of the
+    - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the
+      quaternion changes the rotation by at most 2 u. The parallel component changes the length of the
       quaternion, which UsdGeom does not normalize, and so changes a rotation by the angle t by at most 2 u
-      sin t. Both: 4 u.
+      sin t. The sum is at most 4 u.
     - Matrix: the vector of the nine errors is at most sqrt(3) u long, also after the rows are normalized. A
       rotation by a small angle t changes the matrix by a vector of length sqrt(2) t: sqrt(3/2) u.
     """

@@ -1,4 +1,4 @@
-"""Program that reads a USD stage in a separate process, with urdfkin's reader and with OpenUSD's own.
+"""Read a USD stage in a separate process, with urdfkin's reader and with OpenUSD's readers.
 
 A USD stage (scene) can require any amount of time and memory, or crash OpenUSD's parsers, which are written
 in C++. The request and the answer are JSON on standard input and standard output.

@@ -1,7 +1,6 @@
 """The verifier of a robot: it compares results with the oracle and records the checks.
 
-The oracle receives the user's arguments, and each result is compared in the shape in which the method returns
-it.
+The oracle receives the user's arguments. Results are compared in the shape in which a method returns them.
 """
 
 from __future__ import annotations
@@ -53,7 +52,7 @@ Verify = bool | Literal["sample"]
 
 SAMPLE = 100
 
-#: Maximum number of values that are compared at once, so that they fit into the processor's cache.
+#: Maximum number of values that are compared at once; they fit into the processor's cache.
 _PART_SIZE = 262_144
 #: Maximum number of configurations that are compared at once.
 _MOST = 4096
@@ -179,7 +178,7 @@ class Verifier:
         return checked_choice(self.policy if verify is None else verify)
 
     def require_pinocchio(self, verify: Verify | None) -> None:
-        """Raise InstallationError, before the computation, if a check needs Pinocchio and it is missing."""
+        """Raise InstallationError if a check of the call needs Pinocchio, and Pinocchio is missing."""
         if (
             self.policy_of_call(verify) is not False
             and self.unverifiable is None
@@ -206,7 +205,7 @@ class Verifier:
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check the results of a call in the shape in which the call returns them, and record the check.
+        """Check the results of a call, in the shape that the call returns, and record the check.
 
         Raises:
             VerificationError: the oracle's result differs by more than the bound.
@@ -243,8 +242,8 @@ class Verifier:
     ) -> Callable[..., FloatArray | None]:
         """Return a function that calls `compute` for one configuration, and checks and records the result.
 
-        The returned function returns None, without a check, if `compute` returns None (its arguments are not
-        supported), or if the oracle cannot check the robot. The last argument of `compute` is `out`.
+        The last argument of `compute` is `out`. `compute` returns None for unsupported arguments. In this
+        case, and if the oracle cannot check the robot, the returned function returns None without a check.
         """
         quantity, by, frames = QUANTITIES[name], self.library, (frame,)
         if self.cannot(None, by) is not None:
@@ -275,7 +274,7 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
-        """Compare the results `ours` of some configurations with the oracle's; None: they agree."""
+        """Compare the results of some configurations with the oracle's; also return the error, if any."""
         x = call.part(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = comparison_with_oracle(*compared)
@@ -428,8 +427,8 @@ def oracle_results_with_bound(
 def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
     """Return the bound on the difference between urdfkin's results and the oracle's, for broadcasting.
 
-    If a path contains no prismatic joint, its length is the same in every configuration. For a placement or a
-    Jacobian on a fixed base, the bound of one configuration is then stored and used for all.
+    The length of a path without prismatic joints is the same in every configuration. The bound of a placement
+    or a Jacobian on a fixed base is then computed for one configuration, stored, and used for all.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0

@@ -37,8 +37,7 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, oracle_results, own_results
 
-#: Minimum number of decimal digits, that of a double, and maximum number, beyond which a computation takes
-#: too long.
+#: Minimum number of decimal digits (that of a double) and maximum number (for a limited time).
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
 
 _ENDS = np.vectorize(ends, otypes=[float, float])

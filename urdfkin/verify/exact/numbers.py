@@ -35,9 +35,8 @@ DIGITS = 50
 _TWO_DOUBLES = 30
 #: Number of bits for each decimal digit of an interval.
 _BITS = math.log2(10.0)
-#: Number of additional bits of an interval: 15 digits, the precision of a double, have 55 bits. With 53 bits,
-#: an
-#: interval could be four times as wide as the distance of two doubles.
+#: Number of additional bits of an interval. 15 digits, the precision of a double, then have 55 bits.
+#: With 53 bits, an interval could be four times as wide as the distance of two doubles.
 _MORE_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
 _SIGNIFICANT = 17

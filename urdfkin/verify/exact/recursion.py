@@ -1,8 +1,8 @@
 """The forward recursion of section 7.7, computed with intervals that contain the true values.
 
 The inputs are the URDF's decimals and the exact values of q, v and a. The equations are those of
-`urdfkin.kinematics.equations`, in world axes as in the textbook. The results measure rounding errors, but do
-not check the equations; Pinocchio's results do.
+`urdfkin.kinematics.equations`, in world axes as in the textbook. The results measure rounding errors;
+Pinocchio's results check the equations.
 """
 
 from __future__ import annotations
