@@ -193,29 +193,6 @@ def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path], flee
     assert desk.js("return document.querySelectorAll('img').length") == 0
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-@pytest.mark.parametrize("width", [1280, 390], ids=["desk", "phone"])
-def test_all_text_has_enough_contrast_and_nothing_is_wider_than_the_screen(
-    dark: bool, width: int, pages: dict[str, Path], screen: Browser
-) -> None:
-    name = f"report-{'dark' if dark else 'light'}-{'desk' if width > 600 else 'phone'}"
-    screen.errors()
-    screen.become(width, dark=dark)
-    screen.open(pages["failing"])
-    screen.screenshot(f"{name}-top")
-    screen.probe("unfoldAll")
-    screen.settle()
-    texts, poor = screen.probe("poorContrast")
-    assert texts > 500
-    assert poor == []
-    assert screen.js("return document.documentElement.scrollWidth") <= width
-    for part in (".view", ".pair", ".dh", ".cases"):
-        screen.js("document.querySelector(arguments[0]).scrollIntoView()", part)
-        screen.settle()
-        screen.screenshot(f"{name}-{part[1:]}")
-    assert screen.errors() == []
-
-
 @pytest.mark.parametrize("width", [1280, 980, 760])
 def test_no_column_is_cut_and_no_card_is_alone(width: int, pages: dict[str, Path], tmp_path: Path) -> None:
     with opened(tmp_path, width=width, height=1000) as browser:

@@ -2,6 +2,7 @@
 
 import itertools
 from functools import reduce
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -51,8 +52,8 @@ def test_a_result_that_differs_from_two_equal_results_is_the_outlier(
 
 def test_the_sum_does_not_depend_on_the_order() -> None:
     some = [checked_results(*results) for results in ((0, 4, 16), (100, 0, 0), (0, 100, 300))]
-    (total,) = {reduce(plus, order) for order in itertools.permutations(some)}
-    assert total is not None
+    (total,) = {reduce(add, order) for order in itertools.permutations(some)}
+    assert plus(None, total) == plus(total, None) == total
     assert total.alone == (1, 0, 0)
     assert total.undecided == 1
     assert total.urdfkin.failed == 2

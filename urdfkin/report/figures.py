@@ -70,34 +70,22 @@ def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarr
         tops = base + _HEIGHT * heights[: len(at) - 1]
         axes.stairs(tops, at, baseline=base, fill=True, color=FIRST, alpha=0.85, linewidth=0, zorder=3)
     exact = counts[: first + 1].sum() / results if results else 0.0
-    axes.annotate(
-        f"{exact:.0%}" if exact else "",
-        (_LEFT, base),
-        xytext=(-4, 2),
-        textcoords="offset points",
-        ha="right",
-        fontsize=8,
-        color=TEXT,
-    )
+    _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
     _bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
     if largest is None or largest > right:  # the mark is at the right end of the axis
-        axes.annotate(
-            "✗ not finite" if largest is None else f"✗ {units(largest)} ▸",
-            (1.0, base + 0.13),
-            xycoords=("axes fraction", "data"),
-            ha="right",
-            va="center",
-            fontsize=8,
-            weight="bold",
-            color=THIRD,
-            zorder=6,
-        )
+        text = "✗ not finite" if largest is None else f"✗ {units(largest)} ▸"
+        place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}
+        axes.annotate(text, (1.0, base + 0.13), fontsize=8, weight="bold", color=THIRD, zorder=6, **place)
     elif largest:
-        failed = any(check["failed"] for check in checks)
-        axes.plot(
-            [largest], [base + 0.13], marker="v", markersize=5, color=THIRD if failed else TEXT, zorder=5
-        )
+        colour = THIRD if any(check["failed"] for check in checks) else TEXT
+        axes.plot([largest], [base + 0.13], marker="v", markersize=5, color=colour, zorder=5)
+
+
+def _annotate_left(axes: Axes, text: str, y: float, points: float, **style: Any) -> None:
+    """Write a text left of the axis, at a height `y` and some points above."""
+    place: dict[str, Any] = {"xytext": (-4, points), "textcoords": "offset points", "ha": "right"}
+    axes.annotate(text, (_LEFT, y), color=TEXT, **place, **style)
 
 
 def _bound(axes: Axes, base: int, checks: Sequence[ReportedCheck]) -> None:
@@ -122,16 +110,7 @@ def _decorate(axes: Axes, names: Sequence[str], right: float) -> None:
     axes.tick_params(axis="x", which="both", labelsize=8, colors=TEXT, color=GRID)
     axes.minorticks_off()
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.annotate(
-        "exact",
-        (_LEFT, len(names) - 0.4),
-        xytext=(-4, 6),
-        textcoords="offset points",
-        ha="right",
-        fontsize=7.5,
-        color=TEXT,
-        annotation_clip=False,
-    )
+    _annotate_left(axes, "exact", len(names) - 0.4, 6, fontsize=7.5, annotation_clip=False)
     axes.set_xlabel("disagreement with Pinocchio, eps·scale", fontsize=9, color=TEXT)
     for side in ("left", "bottom"):
         axes.spines[side].set_visible(False)

@@ -36,6 +36,7 @@ from urdfkin.report.words import (
     units,
     verdict_counts,
     worst,
+    worst_cell,
 )
 from urdfkin.system.lazy_import import install_remedy
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
@@ -175,7 +176,7 @@ def _totals(document: Document) -> dict[str, Any]:
         "frames": sum(len(robot["frames"]) for robot in robots),
         "results": sum(robot["results"] for robot in robots),
         "failed": sum(robot["failed"] for robot in robots),
-        "worst": units(worst(check["worst"] for check in checks), compared=bool(checks)),
+        "worst": worst_cell(checks),
         "share": percent(worst(map(share_of, robots))) if checks else "",
     }
 

@@ -13,11 +13,10 @@ from urdfkin.report.words import (
     check_name,
     columns,
     counted,
-    percent,
     second_oracle_heads,
     second_oracle_rows,
     second_oracle_title,
-    share_of,
+    share_cell,
     summary,
     units,
     worst_of,
@@ -95,14 +94,13 @@ def _body(robots: list[ReportedRobot], room: int) -> list[str]:
 
 def _cells(robot: ReportedRobot, quantities: list[tuple[str, ...]]) -> list[str]:
     verdict = robot["verdict"]
-    share = percent(share_of(robot)) if robot["checks"] else ""
     return [
         markdown_code(shortened(robot["source"], 60)),
         str(len(robot["joints"])),
         str(len(robot["frames"])),
         f"{robot['results']:,}",
         *(worst_of(robot, names) for names in quantities),
-        share,
+        share_cell(robot),
         f"{_MARKS[verdict]} {verdict}",
     ]
 

@@ -19,9 +19,11 @@ from urdfkin.report.words import (
     more_accurate,
     percent,
     quantity_name,
+    share_cell,
     share_of,
     units,
     worst,
+    worst_cell,
     worst_of,
 )
 from urdfkin.validation.document import (
@@ -59,9 +61,9 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
         "results": robot["results"],
         "failed": robot["failed"],
         "quantities": [(worst_of(robot, names), _key(robot, names)) for names in quantities_of],
-        "worst": units(largest, compared=bool(checks)),
+        "worst": worst_cell(checks),
         "worst_key": _sortable(largest) if checks else -1.0,
-        "share": percent(share) if checks else "",
+        "share": share_cell(robot),
         "share_key": _sortable(share) if checks else -1.0,
         "findings": ", ".join(
             counted(count, word) for word in ("error", "warning") if (count := _findings(robot, word))

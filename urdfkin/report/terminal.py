@@ -28,10 +28,11 @@ from urdfkin.report.words import (
     second_oracle_rows,
     second_oracle_title,
     second_reader_words,
-    share_of,
+    share_cell,
     summary,
     units,
     worst,
+    worst_cell,
     worst_of,
 )
 from urdfkin.validation.document import Document, ReportedAccuracy, ReportedRobot, outcome_of
@@ -96,8 +97,8 @@ def _print_robots(robots: Sequence[ReportedRobot], out: Console) -> None:
     rows = [
         [
             *_counts(robot),
-            units(worst(check["worst"] for check in robot["checks"]), compared=bool(robot["checks"])),
-            percent(share_of(robot)) if robot["checks"] else "",
+            worst_cell(robot["checks"]),
+            share_cell(robot),
             robot["verdict"],
         ]
         for robot in robots

@@ -103,8 +103,17 @@ def column(robot: ReportedRobot, names: Sequence[str]) -> list[ReportedCheck]:
 
 def worst_of(robot: ReportedRobot, names: Sequence[str]) -> str:
     """Return the text of a cell: the worst disagreement of several quantities in all reference frames."""
-    checks = column(robot, names)
+    return worst_cell(column(robot, names))
+
+
+def worst_cell(checks: Sequence[ReportedCheck]) -> str:
+    """Return the worst disagreement of checks as text; empty if there are no checks."""
     return units(worst(check["worst"] for check in checks), compared=bool(checks))
+
+
+def share_cell(robot: ReportedRobot) -> str:
+    """Return the largest ratio of a disagreement to its bound as text; empty if nothing was compared."""
+    return percent(share_of(robot)) if robot["checks"] else ""
 
 
 def error_cells(line: ReportedAccuracyLine) -> list[str]:

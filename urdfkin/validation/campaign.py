@@ -127,7 +127,7 @@ def validate(
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
     cut = Cut(samples)
     collector = ResultCollector(found, cut, chunks_of_shard(len(found), cut, shard), progress)
-    # Each machine of an executor computes its own limit.
+    # An executor may run chunks on other machines, and each machine computes its own memory limit.
     memory_limit = memory.limit(jobs) if executor is None else None
     campaign = _Campaign(found, cut, seed, memory_limit, collector)
     interrupted, begin = False, time.perf_counter()
@@ -141,7 +141,7 @@ def validate(
             if saved is not None:
                 campaign.use(saved)
             for i, error in unread.items():
-                for index in collector.missing(i):  # one failed chunk fails the robot
+                for index in collector.missing(i):  # after one failed chunk, no chunk is missing
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if _kernels_pay(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
@@ -240,7 +240,7 @@ def _kernels_pay(samples: int) -> bool:
 
 @dataclass
 class _Campaign:
-    """The tasks of a run, and the places for their answers."""
+    """The tasks of a run, with the collector and the store that receive the answers."""
 
     subjects: Sequence[RobotInput]
     cut: Cut

@@ -140,9 +140,9 @@ class Cut:
         return random + (SPECIAL if chunks.start == 0 else 0)
 
 
-def chunks(subject: RobotInput, samples: int, seed: int, most: int | None = None) -> Iterator[Chunk]:
+def chunks(subject: RobotInput, samples: int, seed: int) -> Iterator[Chunk]:
     cut = Cut(samples)
-    return (cut.chunk(subject, seed, index, most) for index in range(len(cut)))
+    return (cut.chunk(subject, seed, index) for index in range(len(cut)))
 
 
 _Models = tuple[Robot, Oracle, SecondOracleModel | None]

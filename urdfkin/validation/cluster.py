@@ -122,11 +122,14 @@ class _ClusterWorker(_Portless, Worker):
 
 @contextmanager
 def _without_ports(number: int) -> Iterator[SpecCluster]:
-    """Yield a scheduler and workers in this process that open no port; ClusterError if Dask opens a port.
+    """Yield a scheduler and workers in this process that open no port.
 
     Chunks run in separate processes. Dask adds its scratch folders to the front of `sys.path`. These folders
     are in a temporary folder of this run, which only this user can access. `sys.path` is restored before any
     further import.
+
+    Raises:
+        ClusterError: Dask has opened a port.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -270,8 +273,8 @@ class Cluster:
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as gone:  # results come through the scheduler, which is lost
-                raise self._lost() from gone
+            except OSError as lost:  # the scheduler, which transfers the results, is lost
+                raise self._lost() from lost
             return _answer(result, task)
         if self._client.status != "running":
             raise self._lost()

@@ -33,6 +33,8 @@ _MOST = 3
 _FEW = 4
 #: Smallest scale by which a difference is divided, relative to the largest scale.
 _LEAST = 1e-9
+#: Maximum difference, relative to the scale, at which two results count as equal.
+_EQUAL = 1e-9
 #: Order of the rows of a six-vector with exchanged linear and angular halves.
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
@@ -64,7 +66,7 @@ class Diagnosis:
 
         `predicted` are urdfkin's results with the mistake. With `n`, only the first n results are compared.
         """
-        scale = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
+        scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
             whole = float((np.abs(self.found[:n] - self.expected[:n]) / scale).max())
             left = float((np.abs(self.found[:n] - predicted) / scale).max())
@@ -72,11 +74,13 @@ class Diagnosis:
 
     def is_expected(self, predicted: FloatArray) -> bool:
         """Return whether the predicted results equal the expected results: the mistake has no effect."""
-        size = np.maximum(self.scale, _LEAST * self.scale.max(initial=_LEAST))
-        return bool((np.abs(predicted - self.expected) <= _LEAST * size).all())
+        return bool((np.abs(predicted - self.expected) <= _EQUAL * self._nonzero_scale()).all())
+
+    def _nonzero_scale(self, n: int | None = None) -> FloatArray:
+        scale: FloatArray = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
+        return scale
 
     def first(self, n: int) -> Inputs:
-        """Return the inputs of the first n configurations."""
         return tuple(x[:n] for x in self.inputs)
 
 
@@ -203,10 +207,7 @@ class Mistakes:
         return found if self.conversion is None else self.conversion.six(found)
 
     def _ours(self, inputs: Inputs) -> Inputs:
-        if self.conversion is None:
-            return inputs
-        found = self.conversion.from_(*inputs)
-        return found if isinstance(found, tuple) else (found,)
+        return inputs if self.conversion is None else as_tuple(self.conversion.from_(*inputs))
 
     def _of_placements(self, case: Diagnosis) -> Iterator[Mistake]:
         yield "the placement is inverted", partial(np.asarray, np.linalg.inv(case.expected))
@@ -418,6 +419,10 @@ class Mistakes:
             )
 
 
+def as_tuple(x: FloatArray | Inputs) -> Inputs:
+    return x if isinstance(x, tuple) else (x,)
+
+
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
     """Yield mistakes in single columns of a Jacobian, with 0.0 as the unexplained fraction."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
@@ -427,7 +432,7 @@ def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]
     size = np.maximum(case.scale, np.finfo(float).tiny)
 
     def equal(i: int, x: FloatArray) -> bool:
-        return bool((np.abs(theirs[..., i] - x) <= 1e-9 * size[..., i]).all())
+        return bool((np.abs(theirs[..., i] - x) <= _EQUAL * size[..., i]).all())
 
     wrong = [i for i in range(ours.shape[-1]) if not equal(i, ours[..., i])]
     for i in wrong:

@@ -27,7 +27,7 @@ from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import plain
-from urdfkin.validation.diagnosis import Diagnosis, Mistakes, diagnose
+from urdfkin.validation.diagnosis import Diagnosis, Mistakes, as_tuple, diagnose
 from urdfkin.verify.bounds import result_k
 from urdfkin.verify.comparison import disagreement
 from urdfkin.verify.oracles import versions
@@ -447,7 +447,7 @@ class _Run:
         k = result_k(bound, flat.shape[:2])[:, 0] * self.factor
         inputs: tuple[FloatArray, ...] = ours
         if self.conversion is not None:
-            inputs = _tuple(self.conversion.to(*ours))
+            inputs = as_tuple(self.conversion.to(*ours))
             scale = self._converted_scale(ours, scale)
             k = k + self._rounding_of_the_conversion(ours[0]) * self.factor
         expected = self._converted(ours, result)
@@ -472,7 +472,7 @@ class _Run:
         return found
 
     def _ours(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-        return tuple(inputs) if self.conversion is None else _tuple(self.conversion.from_(*inputs))
+        return tuple(inputs) if self.conversion is None else as_tuple(self.conversion.from_(*inputs))
 
     def _converted(
         self,
@@ -666,7 +666,3 @@ def _call(
         total.error(sample, f"shape {found.shape}, expected {shape}", configurations)
         return None
     return found
-
-
-def _tuple(x: FloatArray | tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
-    return x if isinstance(x, tuple) else (x,)

@@ -113,17 +113,19 @@ class RobotReport:
         return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
     def as_dict(self, study: AccuracyStudy | None = None) -> dict[str, Any]:
-        return {
-            "source": self.source,
-            "name": self.name,
-            "verdict": self.verdict,
-            "reason": self.reason,
-            "error": self.error,
-            "joints": self.joints,
-            "frames": self.frames,
-            "samples": self.samples,
-            "results": self.results,
-            "failed": self.failed,
+        names = (
+            "source",
+            "name",
+            "verdict",
+            "reason",
+            "error",
+            "joints",
+            "frames",
+            "samples",
+            "results",
+            "failed",
+        )
+        return {name: getattr(self, name) for name in names} | {
             "seconds": round(self.seconds, 3),
             "timings": self.timings.as_dict() if self.timings else None,
             "model": self.summary.model,
@@ -139,12 +141,8 @@ class RobotReport:
         tally = self.tallies[key]
         case = tally.case
         worst_case = case and {
-            "sample": case.sample,
-            "frame": case.frame,
+            **{name: getattr(case, name) for name in ("sample", "frame", "q", "v", "a")},
             "disagreement": case.units,
-            "q": case.q,
-            "v": case.v,
-            "a": case.a,
             "replay": self.replay(key),
         }
         return {
