@@ -313,7 +313,6 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
 
 
 def _statement_errors(document: SameCertificate, comparator: Comparator, result: Sameness) -> Iterator[str]:
-    """Yield errors in entries without a proof: names, verdict, differences, tools, and `DERIVED` entries."""
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
         if model["name"] != robot.name:
@@ -374,7 +373,6 @@ def _confirmation_errors(
 
 
 def _gauge(document: SameCertificate) -> Gauge:
-    """Return the transforms, offsets and joint orders with which a certificate aligns B with A."""
     joints, base = document["joints"], document["base_links"]
     return Gauge(
         (base[0], base[1]),
@@ -485,7 +483,6 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        # A claimed upper bound is wrong if the models reach a larger distance.
         attained = max(claim["lower"], float(search.sampled_distances([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
