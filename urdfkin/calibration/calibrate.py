@@ -63,7 +63,7 @@ _UNLIKELY = 4.0
 _WEAK = 10.0
 #: Seed of the random configurations for `Calibration.weak`.
 _WEAK_SEED = 1
-#: Largest diagonal entry of R in J = Q R that means dependent columns, as a fraction of R's largest entry.
+#: Diagonal entry of R in J = Q R below which columns count as dependent, relative to R's largest entry.
 _DEPENDENT = 1e-12
 #: Divisors of the robot's size that give the coordinates of a target that lies on no joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}

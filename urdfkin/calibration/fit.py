@@ -471,9 +471,9 @@ def _from_poses(
     if base and tool:
         B[:3, :3], X[:3, :3] = _rotations(T[:, :3, :3], R)
     elif base:
-        B[:3, :3] = _rotation(np.einsum("sij,skj->ik", R, T[:, :3, :3]))
+        B[:3, :3] = _nearest_rotation(np.einsum("sij,skj->ik", R, T[:, :3, :3]))
     else:
-        X[:3, :3] = _rotation(np.einsum("sji,sjk->ik", T[:, :3, :3], R))
+        X[:3, :3] = _nearest_rotation(np.einsum("sji,sjk->ik", T[:, :3, :3], R))
     B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
     return B, X
 
@@ -484,7 +484,7 @@ def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tup
     for _ in range(_REPETITIONS if base and tool else 1):
         if base:
             points = T[:, :3, :3] @ X[:3, 3] + T[:, :3, 3]
-            B[:3, :3] = _rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
+            B[:3, :3] = _nearest_rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
         before = X[:3, 3].copy()
         B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
         if np.linalg.norm(X[:3, 3] - before) <= _CONSTANT_TARGET * np.linalg.norm(X[:3, 3]):
@@ -500,11 +500,10 @@ def _rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
     null = np.linalg.svd(np.hstack([left, -right]), full_matrices=False)[2][-1]
     B, X_back = null[:9].reshape(3, 3), null[9:].reshape(3, 3)
     sign = np.sign(np.linalg.det(B)) or 1.0
-    return _rotation(sign * B), _rotation(sign * X_back).T
+    return _nearest_rotation(sign * B), _nearest_rotation(sign * X_back).T
 
 
-def _rotation(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a matrix."""
+def _nearest_rotation(M: FloatArray) -> FloatArray:
     U, _, Vt = np.linalg.svd(M)
     if np.linalg.det(U @ Vt) < 0.0:
         U[:, 2] *= -1.0

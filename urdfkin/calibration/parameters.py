@@ -235,8 +235,6 @@ class CalibrationModel:
 
 
 class _ModelBuilder:
-    """Collector of a model's transforms and parameters, from base to tip."""
-
     def __init__(self, fit: Collection[str]) -> None:
         for name in fit:
             if name not in FITTED:
@@ -254,7 +252,6 @@ class _ModelBuilder:
         return len(self.parameters) - 1
 
     def end(self, which: str) -> None:
-        """Add the six parameters of the base or the tool, if these parameters shall be fitted."""
         if which in self.fit:
             self.origin(which, _ALL, end=True)
 

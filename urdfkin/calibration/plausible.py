@@ -291,7 +291,6 @@ def _corrections(model: CalibrationModel, q: FloatArray) -> Iterator[_Correction
 
 
 def _with_signs(model: CalibrationModel, q: FloatArray, signs: FloatArray) -> _Correction:
-    """Return the correction that multiplies the value of each coordinate by its sign."""
     names = [name for name, sign in zip(model.coupling.names, signs, strict=True) if sign < 0.0]
     joints = _list(map(repr, names))
     reason = f"the signs of joints {joints} are wrong; negate their values or their axes"
@@ -332,8 +331,6 @@ def _several_signs(fit: FitWithData) -> _Trial | None:
 
 
 class _Trial:
-    """A correction of the data, with the fit after the correction."""
-
     def __init__(self, original: FitWithData, correction: _Correction) -> None:
         self.original, self.correction = original, correction
         model, poses = original.model, np.zeros(len(original.measured), dtype=bool)
@@ -357,7 +354,6 @@ class _Trial:
         return FitWithData(model, self.correction.q, measured, identification, before, fitted)
 
     def is_plausible(self, limit: float) -> bool:
-        """Return whether the fit after the correction is plausible and has an error below the limit."""
         try:
             fit = self.fit
         except np.linalg.LinAlgError:

@@ -132,7 +132,6 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
 
 def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> Rewritten:
-    """Fit the robot's joint origins to computed poses of the calibrated arm."""
     own = robot.chain(tip, base).coupling
     if len(own.names) != len(calibrated.joint_names):
         raise InputError(

@@ -49,7 +49,7 @@ STARTS = 4
 TRIED_VALUES = 13
 #: Number of frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
-#: Fractions of its range over which a coordinate is varied, one for each round of a search.
+#: Fraction of a coordinate's range over which the coordinate is varied, for each round of a search.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
@@ -76,7 +76,7 @@ class DistanceSearch:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) pose of B's base link in A's root frame. If A's base link moves, this pose moves with it.
+        #: (4, 4) pose of B's base link in A's root frame, in A's zero configuration.
         self.T_root_base = found.X @ found.b.homes[found.base[1]]
         #: Whether the base link belongs to the same rigid body as the root link, for each robot.
         self.base_fixed = tuple(

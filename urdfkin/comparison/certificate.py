@@ -44,10 +44,8 @@ DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links"
 class CertifiedModel(TypedDict):
     """Name and source of one of the two compared models."""
 
-    name: Annotated[str, says("The robot's name.")]
-    source: Annotated[
-        str, says("Source of the robot: a path, a catalogue name, - for standard input, or <text>.")
-    ]
+    name: Annotated[str, says("Name of the robot.")]
+    source: Annotated[str, says("Path, catalogue name, - for standard input, or <text>.")]
 
 
 class CertifiedRule(TypedDict):
@@ -67,20 +65,13 @@ class DifferenceEntry(TypedDict):
 
     place: Annotated[str, says("Name of the joint or link of A that differs.")]
     what: Annotated[str, says("Name of the parameter that differs: axis, place, mimic rule, limits, ...")]
-    a: Annotated[Value, says("Value of the parameter in A; null: A has none.")]
-    b: Annotated[Value, says("Value of the parameter in B; null: B has none.")]
-    radians: Annotated[
-        Size, says("Size of the difference as an angle, radians; 0 if the difference has no angle.")
-    ]
-    metres: Annotated[
-        Size, says("Size of the difference as a length, metres; 0 if the difference has no length.")
-    ]
+    a: Annotated[Value, says("Value of the parameter in A; null if A has none.")]
+    b: Annotated[Value, says("Value of the parameter in B; null if B has none.")]
+    radians: Annotated[Size, says("Angular part of the difference, radians; 0 if there is none.")]
+    metres: Annotated[Size, says("Linear part of the difference, metres; 0 if there is none.")]
     detail: Annotated[
         Literal["", "alone", "converted"],
-        says(
-            "`alone`: the links after the joint agree. `converted`: the limits of B are expressed in A's"
-            " coordinate."
-        ),
+        says("`alone`: the links after the joint agree. `converted`: B's limits are in A's coordinate."),
     ]
 
 
@@ -89,23 +80,19 @@ class CertifiedConversion(TypedDict):
 
     before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
-    back: Annotated[
-        bool, says("Whether the pose in A is inverted, because the joint is reversed in one model.")
-    ]
+    back: Annotated[bool, says("Whether the pose in A is inverted: one model has the joint reversed.")]
 
 
 class CertifiedJoint(TypedDict):
-    """A joint of A and the matching joint of B."""
+    """A joint of A and the matching joint of B: value in B = `sense` * value in A + `offset`."""
 
     a: Annotated[str, says("Name of the joint in A.")]
     b: Annotated[str, says("Name of the joint in B.")]
     sense: Annotated[Literal[1, -1], says("Factor `sense` in: value in B = `sense` * value in A + `offset`.")]
-    offset: Annotated[
-        float, says("Constant `offset` in: value in B = `sense` * value in A + `offset`, rad or m.")
-    ]
+    offset: Annotated[float, says("Constant `offset`, rad or m.")]
     conversion: Annotated[
         CertifiedConversion | None,
-        says("Conversion of a planar or floating joint's pose; null: no conversion is needed."),
+        says("Conversion of a planar or floating joint's pose; null if not needed."),
     ]
 
 
@@ -129,24 +116,11 @@ class FrameEntry(TypedDict):
 
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
-    lower: Annotated[
-        Size, says("Lower bound of the largest distance, metres; it is attained at `q_a` and `q_b`.")
-    ]
-    upper: Annotated[
-        Size | None,
-        says(
-            "Proven upper bound of the distance in all configurations within limits, metres; null: no bound."
-        ),
-    ]
-    radians: Annotated[
-        Size | None,
-        says("Proven upper bound of the angle between the orientations, radians; null: no bound."),
-    ]
+    lower: Annotated[Size, says("Lower bound of the largest distance, metres: the distance at `q_a`, `q_b`.")]
+    upper: Annotated[Size | None, says("Proven upper bound of the distance, metres; null without a bound.")]
+    radians: Annotated[Size | None, says("Proven upper bound of the angle, radians; null without a bound.")]
     radians_seen: Annotated[Size, says("Angle between the orientations at `q_a` and `q_b`, radians.")]
-    q_a: Annotated[
-        list[float],
-        says("Configuration of A at which the lower bound is attained; empty if the frame does not differ."),
-    ]
+    q_a: Annotated[list[float], says("Configuration of A; empty if the frame does not differ.")]
     q_b: Annotated[list[float], says("Configuration of B that corresponds to `q_a`.")]
 
 
@@ -155,9 +129,7 @@ class Confirmed(TypedDict):
 
     state: Annotated[ConfirmationState, says("Whether the oracle confirmed the bounds.")]
     by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
-    configurations: Annotated[
-        Count, says("Number of configurations at which the oracle computed the distances.")
-    ]
+    configurations: Annotated[Count, says("Number of configurations of the oracle's check.")]
     metres: Annotated[Size, says("Largest distance that the oracle computed, metres.")]
     reason: Annotated[str, says("Reason why the oracle computed no distances; empty if it computed them.")]
 
@@ -169,26 +141,17 @@ class SameCertificate(Header):
     b: CertifiedModel
     up_to: Annotated[
         list[Literal["base", "zeros", "senses", "free joints", "tools"]],
-        says("Kinds of changes that are applied to B so that the models agree best."),
+        says("Kinds of changes of B with which the models agree best."),
     ]
-    differences: Annotated[
-        list[DifferenceEntry], says("Differences between the models, in order from the base to the tips.")
-    ]
+    differences: Annotated[list[DifferenceEntry], says("Differences, in order from the base to the tips.")]
     remarks: Annotated[
         list[DifferenceEntry],
         says("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
     ]
     joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
-    links: Annotated[
-        list[Annotated[list[str], of_length(2)]], says("Matched pairs of a link of A and a link of B.")
-    ]
-    tools: Annotated[
-        list[ToolEntry], says("Matched links whose poses differ; they count as different tools.")
-    ]
-    orders: Annotated[
-        list[list[str]],
-        says("Lists of adjacent joints of B that were compared in another order, which their axes allow."),
-    ]
+    links: Annotated[list[Annotated[list[str], of_length(2)]], says("Pairs of a link of A and a link of B.")]
+    tools: Annotated[list[ToolEntry], says("Matched links whose poses differ, as those of different tools.")]
+    orders: Annotated[list[list[str]], says("Adjacent joints of B that were compared in this other order.")]
     base: Annotated[Matrix, says("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
         list[str], of_length(2), says("The link of A and the link of B in whose frames poses are compared.")
@@ -200,10 +163,7 @@ class SameCertificate(Header):
     ]
     as_written: Annotated[
         FrameEntry | None,
-        says(
-            "Interval of the largest distance of the farthest frame without any change of B; null: B"
-            " needs no change."
-        ),
+        says("Interval of the farthest frame without any change of B; null if B needs no change."),
     ]
     checked: Confirmed
 
@@ -313,7 +273,6 @@ def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
 
 
 def _statement_errors(document: SameCertificate, comparator: Comparator, result: Sameness) -> Iterator[str]:
-    """Yield errors in entries without a proof: names, verdict, differences, tools, and `DERIVED` entries."""
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
         if model["name"] != robot.name:
@@ -374,7 +333,6 @@ def _confirmation_errors(
 
 
 def _gauge(document: SameCertificate) -> Gauge:
-    """Return the transforms, offsets and joint orders with which a certificate aligns B with A."""
     joints, base = document["joints"], document["base_links"]
     return Gauge(
         (base[0], base[1]),
@@ -485,7 +443,6 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        # A claimed upper bound is wrong if the models reach a larger distance.
         attained = max(claim["lower"], float(search.sampled_distances([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"

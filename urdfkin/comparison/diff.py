@@ -338,7 +338,7 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
     joints[i] = replace(joint, parent=joints[i].parent)
     try:
         changed, unchanged = (_quiet_robot(tree) for tree in (replace(old, joints=tuple(joints)), old))
-    except InputError:  # a URDF cannot describe this copy
+    except InputError:  # a URDF cannot describe the changed tree
         return None
     worst = same(unchanged, changed).worst_as_written
     return None if worst is None else Effect(element, worst)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: Tolerance for the entries of poses, relative to max(1, largest entry).
 #: Libraries that compute in double precision differ by less than 1e-13.
 _TOLERANCE = 1e-9
-#: Value of `_TOLERANCE` for libraries that compute in single precision.
+#: Tolerance `_TOLERANCE` of libraries that compute in single precision.
 _TOLERANCE_SINGLE = 1e-5
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
@@ -232,7 +232,6 @@ def _differences(
     own: Sequence[str],
     tolerance: float,
 ) -> Iterator[ReaderDifference]:
-    """Yield the joints whose child link has another pose in the parent link."""
     for i, joint in enumerate(robot.tree.joints, 1):
         if i not in theirs or joint.parent not in theirs:
             continue
@@ -268,7 +267,6 @@ def _cause(
 
 
 def _motion(joint: Joint, T: FloatArray, T_theirs: FloatArray, tolerance: float) -> str:
-    """Return the difference between urdfkin's and the library's motion from q = 0 as text."""
     start = np.linalg.inv(T[0])
     ours, theirs = start @ T[1:], start @ T_theirs[1:]
     if joint.kind is JointKind.PRISMATIC:

@@ -37,8 +37,8 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
-#: Smallest numbers that are written without a unit prefix (0.9 m) and with one (0.1 mm).
-#: A number that four digits round up to 0.9 or 0.1 is included.
+#: Smallest numbers that are written without a unit prefix (0.9 m) and with a unit prefix (0.1 mm).
+#: They include numbers that are rounded up to 0.9 or 0.1.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
@@ -677,7 +677,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
             if is_mount and rounding.holds(
                 *pose_difference(alignment.a.homes[frame.a], alignment.b.homes[frame.b])
             ):
-                continue  # the line about the base already reports this difference
+                continue  # the line about the base reports the displacement of this frame
         if (tool := alignment.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (

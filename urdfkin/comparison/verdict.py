@@ -126,7 +126,6 @@ def same(
 
 
 def _parse_map(joint_map: Mapping[str, str] | None) -> dict[str, str]:
-    """Return the user's map of joints; raise InputError if it does not map names to names."""
     if joint_map is None:
         return {}
     if not isinstance(joint_map, Mapping) or any(

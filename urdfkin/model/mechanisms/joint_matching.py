@@ -243,7 +243,7 @@ def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
 
 
 _Some = TypeVar("_Some")
-#: An object of mechanism A and an object of mechanism B.
+#: Pair of an object of mechanism A and an object of mechanism B.
 Both = tuple[_Some, _Some]
 
 
@@ -427,9 +427,6 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 #: Its arguments are the two child bodies, the two joints, and the pose of the parent body in B.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Maximum number of joints on a path for the recursive search for exact matches.
-#: A mechanism with a longer path is matched without this search.
-DEEPEST = 200
 #: Maximum number of joint pairs at two bodies that the search for exact matches tries.
 MOST_ASSIGNMENTS = 5000
 
@@ -453,7 +450,6 @@ class Congruence:
     ) -> None:
         self.a, self.b, self.pairing, self.tolerance, self.poses = a, b, pairing, tolerance, poses
         self._known = dict[tuple[int, int, int], list[tuple[FloatArray, _Match | None]]]()
-        self._off = max(*a.depths, *b.depths) > DEEPEST
         self._rules = True
 
     def ignore_rules(self) -> None:
@@ -467,12 +463,12 @@ class Congruence:
         `via` contains the joints before the bodies; None at the first bodies. The motion X (4, 4) moves B's
         body from B's zero configuration to the pose of A's body.
         """
-        found = None if self._off else self._at(bodies, via, X)
+        found = self._at(bodies, via, X)
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
         """Return the pose (4, 4) of B's body after two joints if the subtrees match exactly, else None."""
-        found = None if self._off else self._behind(e, f, bodies, X)
+        found = self._behind(e, f, bodies, X)
         return None if found is None else found.X
 
     def _at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> tuple[Sequence[Pair], Rates] | None:

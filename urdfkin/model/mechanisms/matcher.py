@@ -23,7 +23,6 @@ from urdfkin.model.mechanisms.joint_matching import (
     Congruence,
     Pair,
     Pairing,
-    Via,
     family,
     later_axes,
     root_poses_by_axes,
@@ -53,6 +52,8 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
+#: Maximum number of joints on a path for the search for an exact match, which is recursive.
+DEEPEST = 200
 #: Number of further joints that the matcher compares if two choices agree equally well.
 AHEAD = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
@@ -124,9 +125,11 @@ class MechanismMatcher:
         #: Number of joints and links that agree in the best alignment so far.
         self.matched = 0
         #: Search for exactly matching subtrees; None if `gauge` prescribes the alignment.
-        self.exact = Congruence(a, b, pairing, tolerance, self._poses_after) if gauge is None else None
+        self.exact: Congruence | None = None
+        if gauge is None and max(*a.depths, *b.depths) <= DEEPEST:
+            self.exact = Congruence(a, b, pairing, tolerance, self._poses_after)
 
-    # -- where to begin ------------------------------------------------------------------------------
+    # -- first bodies ------------------------------------------------------------------------------
 
     def best(self) -> Alignment:
         """Return the best alignment over all first bodies, or the first of several that are equally good."""
@@ -157,12 +160,12 @@ class MechanismMatcher:
             return
         bases = list(self._start_bodies())
         if self.exact is not None:
-            exact = self._exact_start(bases)
-            if exact is None and any(joint.mimic for m in (self.a, self.b) for joint in m.tree.joints):
+            start = self._exact_start(self.exact, bases)
+            if start is None and any(joint.mimic for m in (self.a, self.b) for joint in m.tree.joints):
                 self.exact.ignore_rules()
-                exact = self._exact_start(bases)
-            if exact is not None:
-                yield exact
+                start = self._exact_start(self.exact, bases)
+            if start is not None:
+                yield start
         for base in bases:
             if self._most_matches(base) < self.matched:
                 continue
@@ -190,12 +193,14 @@ class MechanismMatcher:
             most += sum(map(min, *branches))
         return most
 
-    def _exact_start(self, bases: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], FloatArray] | None:
+    def _exact_start(
+        self, exact: Congruence, bases: Sequence[tuple[int, int]]
+    ) -> tuple[tuple[int, int], FloatArray] | None:
         """Return two bodies and a pose of B's root for which A matches B exactly, or None."""
         for base in bases:
             if self.pairing.same_shape(base, (None, None)):
                 for X in self._exact_root_poses(base):
-                    if self._exact_pairs(base, (None, None), X) is not None:
+                    if exact.joint_pairs(base, (None, None), X) is not None:
                         return base, X
         return None
 
@@ -267,13 +272,11 @@ class MechanismMatcher:
         return found
 
     def _joint_pairs(self, place: BodyPair) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        pairs = self._exact_pairs(place.bodies, place.via, inverse(place.G) @ place.XC)
-        if pairs is not None:
-            return pairs, (), ()
+        if self.exact is not None:
+            pairs = self.exact.joint_pairs(place.bodies, place.via, inverse(place.G) @ place.XC)
+            if pairs is not None:
+                return pairs, (), ()
         return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
-
-    def _exact_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        return None if self.exact is None else self.exact.joint_pairs(bodies, via, X)
 
     def _poses_after(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
         """Yield poses of the body of B after a joint, if the body before the joint has the pose X."""
@@ -359,7 +362,6 @@ class MechanismMatcher:
     def _match_unlike(
         self, place: BodyPair, via: tuple[Edge, Edge], kinds: tuple[str, str], backwards: tuple[bool, bool]
     ) -> MatchedJoints:
-        """Match two joints of different kinds; one of the joints may be fixed."""
         unlike = {kinds[0]: "a", kinds[1]: "b"}.get("fixed", "kind")
         if unlike == "a":
             axis = _outwards(self.b.screw(via[1]), backwards[1]).moved(inverse(place.G) @ place.XC)
@@ -454,8 +456,8 @@ class MechanismMatcher:
         if sense < 0:
             end = end.reversed()
         K, tilt, shift = smallest_motion(start, end, turns=turns)
-        back = inverse(place.G)
-        kind, (a, b) = "turns" if turns else "prismatic", (e.joint, f.joint)
+        kind = "turns" if turns else "prismatic"
+        step = MatchedJoints(e.joint, f.joint, kind, place.previous, sense, 0.0, IDENTITY, s, s, 0.0, 0.0)
         if self.tolerance.holds(tilt, shift):
             exact = self._exact_pose(place, there)
             if exact is not None:
@@ -463,25 +465,15 @@ class MechanismMatcher:
                 zero = angle_about(t.direction, T[:3, :3]) if turns else float(t.direction @ T[:3, 3])
                 zero = 0.0 if self.tolerance.holds(*pose_difference(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
-            return (
-                MatchedJoints(a, b, kind, place.previous, sense, offset, IDENTITY, s, s, 0.0, 0.0),
-                there,
-                score,
-            )
+            return replace(step, offset=offset), there, score
         # Either the joint and all bodies after the joint have another pose in B, or only the axis differs.
+        step, back = replace(step, tilt=tilt, shift=shift), inverse(place.G)
         with_bodies = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
             alone = self._best_zero(there, place.G, t, turns, zero, depth)
             if better(self._score(alone[1]), self._score(with_bodies[1])):
-                other = end.moved(back)
-                step = MatchedJoints(
-                    a, b, kind, place.previous, sense, alone[0], IDENTITY, s, other, tilt, shift
-                )
-                return step, *alone[1:]
-        before = back @ K @ place.G
-        return MatchedJoints(
-            a, b, kind, place.previous, sense, with_bodies[0], before, s, s, tilt, shift
-        ), *with_bodies[1:]
+                return replace(step, offset=alone[0], other=end.moved(back)), *alone[1:]
+        return replace(step, offset=with_bodies[0], before=back @ K @ place.G), *with_bodies[1:]
 
     def _exact_pose(self, place: BodyPair, there: BodyPair) -> FloatArray | None:
         """Return `XC` of the bodies after two joints if their subtrees match exactly, else None."""
@@ -490,7 +482,7 @@ class MechanismMatcher:
         X = self.exact.pose_after(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
         return None if X is None else place.G @ X
 
-    # -- a joint's zero ------------------------------------------------------------------------------
+    # -- zero offsets ------------------------------------------------------------------------------
 
     def _prescribed(self, joint: str) -> tuple[int, float | None]:
         """Return the sign and the zero offset that `gauge` prescribes, or (0, None)."""
@@ -743,7 +735,6 @@ def _best_alignment(
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
-    """Return the best alignment over all first bodies, or that for the bodies of the links `base`."""
     tolerance = tolerance or tolerance_of(a, b)
     pairing = Pairing(a, b, given, tolerance)
     return MechanismMatcher(a, b, pairing, gauge, ahead or LookAhead(0), tolerance, base).best()
@@ -807,7 +798,7 @@ def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(found):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # Only joints with the most frequent slope get a new zero offset.
+        # Only joint pairs with the most frequent quotient alpha get a new zero offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )

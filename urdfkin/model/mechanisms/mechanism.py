@@ -58,7 +58,7 @@ from urdfkin.kinematics.roundings import AXES, CONSTANT, EPS, WRITTEN
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: A vector counts as parallel to an axis if its component perpendicular to the axis is smaller than this.
+#: Largest perpendicular component of a unit vector that counts as parallel to an axis.
 ALONG = 1e-12
 
 
@@ -670,7 +670,7 @@ class MatchedValues:
     b: LinearFunction
     #: The value of B's joint as B's URDF defines it: sense * b + offset.
     written: LinearFunction
-    #: Rounding error (rad or m) that was removed from the constant of `b`, minus that of one step.
+    #: Difference of the constants (rad or m), as far as it exceeds the rounding error of one joint.
     rounding: float = 0.0
 
     @property

@@ -133,7 +133,7 @@ class Support:
             near = v[at] + up * (v[at + 1] - v[at])
             far = v[at + cells + 1] + up * (v[at + cells + 2] - v[at + cells + 1])
             found = (near + right * (far - near)) * largest
-        found[np.isnan(found)] = np.inf  # Zero times infinity is NaN; the bound is then infinite.
+        found[np.isnan(found)] = np.inf  # zero times infinity is NaN; the bound is then infinite
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
@@ -234,7 +234,7 @@ def upper_bounds(
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
     radians = _angle_bound(steps, pairs, variables, frame)
-    if not steps:  # No joint differs, so the distance is the same in every configuration.
+    if not steps:  # no joint differs, so the distance is equal in all configurations
         d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
         return float(np.linalg.norm(d)), radians
     return _distance_bound(steps, pairs, variables, frame, grid), radians
@@ -441,9 +441,9 @@ def _independent_difference(
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:
-        there = y.rotate(step.other, *variables.range(pair.b))
-        back = Support(y.grid, y.values).rotate(step.axis, *variables.range(pair.a))
-        return Support(y.grid, there.values + back.at(-G))
+        y_b = y.rotate(step.other, *variables.range(pair.b))
+        y_a = y.rotate(step.axis, *variables.range(pair.a))
+        return Support(y.grid, y_b.values + y_a.at(-G))
     chord = _product(2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0), y.radius(step.axis))
     across = np.linalg.norm(G - (G @ u)[:, None] * u, axis=1)
     return Support(y.grid, np.array([_product(length, chord) for length in across]))
