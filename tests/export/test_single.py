@@ -253,8 +253,8 @@ def test_a_bound_is_written_rounded_down_and_by_less_than_ten_millionths(x: floa
 
 def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp_path: Path) -> None:
     text = code(urdfkin.load("ur5"), quantities=("placement", "jacobian")).head
-    words = "in eps*scale with eps = 2^-23, the constants' rounding included:"
-    assert f"Bounds in single precision, {words}" in text
+    words = "with the rounding of constants, in eps*scale (eps = 2^-23):"
+    assert f"Error bounds in single precision, {words}" in text
     (line,) = (x for x in text if x.startswith("  placement ") and ", jacobian " in x)
     assert 1.0 < float(line.split()[1].rstrip(",")) < 24.0 * 7
     large = _FIXED.format("1e39 0 0", "0 0 0")

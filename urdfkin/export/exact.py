@@ -47,9 +47,7 @@ class PiMultiple:
         return self.factor < other
 
     def __radd__(self, other: Number) -> Number:
-        return (
-            other.graph.sum(other, self) if isinstance(other, Node) else self
-        )  # other is 0
+        return other.graph.sum(other, self) if isinstance(other, Node) else self  # other is 0
 
 
 class ExactGraph(Graph):
