@@ -20,23 +20,16 @@ def urdfkin(*words: str | Path) -> Done:
     return running.urdfkin(*map(str, words))
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write a report of a good run and a report of a failed run into a folder."""
-    path = tmp_path_factory.mktemp("data")
-    for name, document in (("good", arms()), ("bad", failing())):
-        (path / f"{name}.json").write_text(json.dumps(document))
+@pytest.fixture
+def good(tmp_path: Path) -> Path:
+    (path := tmp_path / "good.json").write_text(json.dumps(arms()))
     return path
 
 
 @pytest.fixture
-def good(folder: Path) -> Path:
-    return folder / "good.json"
-
-
-@pytest.fixture
-def bad(folder: Path) -> Path:
-    return folder / "bad.json"
+def bad(tmp_path: Path) -> Path:
+    (path := tmp_path / "bad.json").write_text(json.dumps(failing()))
+    return path
 
 
 @pytest.mark.slow

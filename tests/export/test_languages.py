@@ -570,6 +570,8 @@ def test_what_cannot_be_exported_is_refused_with_what_can() -> None:
     for words, error, said in asked:
         with pytest.raises(error, match=said):
             robot.export(*words)
+    with pytest.raises(UnknownNameError, match=r"unknown form 'hd'.*dh"):
+        robot.export("c", form="hd")
     with pytest.raises(InputError, match="the Jacobian has no columns"):
         robot_of("single_link").export("c")
     assert "double" in robot_of("single_link").export("c", quantities=["placement"])
@@ -626,11 +628,6 @@ def test_a_table_in_a_language_is_the_same_file_as_the_robot_in_the_form_dh(to: 
     table = command("dh", "ur5", "--tip", "tool0", "--format", to)
     assert table.code == 0
     assert table.out == command("export", "ur5", "--frame", "tool0", "--form", "dh", "--to", to).out
-
-
-def test_a_form_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(UnknownNameError, match=r"unknown form 'hd'.*dh"):
-        urdfkin.load("planar_two_link").export("c", form="hd")
 
 
 @pytest.mark.slow

@@ -393,9 +393,7 @@ def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium:
             assert _until(lambda before=before: bool((viewer.q != before).any())), label  # type: ignore[misc]
             assert _until(equal), label
         before = viewer.q.copy()
-        chromium.chrome.find_elements("css selector", "[role=slider]")[4].send_keys(
-            "\ue014"
-        )  # right arrow key
+        chromium.chrome.find_elements("css selector", "[role=slider]")[4].send_keys("\ue014")  # right arrow
         assert _until(lambda: viewer.q[4] != before[4])
         assert (np.delete(viewer.q, 4) == np.delete(before, 4)).all(), "the others stay, to the bit"
         assert abs(np.rad2deg(viewer.q[4] - before[4]) - 1.0) < 0.01, "one key moves one degree"

@@ -249,7 +249,7 @@ def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
     say(
-        f"using --order {order}; with the other order, the pose of the tool differs by up to"
+        f"using --order {order}; with the other value of --order, the pose of the tool differs by up to"
         f" {length(metres)} and {angle(radians)} (docs/calibration.md)",
         err=True,
     )

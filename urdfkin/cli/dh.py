@@ -44,7 +44,7 @@ def _columns(_context: click.Context, _option: click.Parameter, value: str) -> t
     names = tuple(name.strip() for name in value.split(","))
     if sorted(names) != ["a", "alpha", "d", "theta"]:
         raise click.BadParameter(
-            f"{value!r} is not the list of `a`, `alpha`, `d` and `theta` in any order, separated by commas"
+            f"{value!r} must be the names `a`, `alpha`, `d` and `theta` in any order, separated by commas"
         )
     return names
 

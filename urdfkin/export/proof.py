@@ -118,7 +118,7 @@ class Proof:
         beyond = [name for name, k in self.single.items() if not np.isfinite(k)]
         bounds = ", ".join(f"{name} {k:.3g}" for name, k in self.single.items() if name not in beyond)
         lines = [
-            "Bounds in single precision, in eps*scale with eps = 2^-23, the constants' rounding included:",
+            "Error bounds in single precision, with the rounding of constants, in eps*scale (eps = 2^-23):",
             f"  {bounds}",
         ]
         return [

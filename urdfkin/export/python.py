@@ -199,7 +199,7 @@ def _demand(
 
 _STACKED = '''
 def _stacked({given}values, zero, shape):
-    """Return numbers of the batch shape of `zero`, or of one that broadcasts, as an array (..., *shape)."""
+    """Stack numbers, whose batch shapes broadcast to that of `zero`, as an array (..., *shape)."""
     batch = tuple(zero.shape)
     values = [{xp}.broadcast_to(x, batch) for x in values]
     return {xp}.reshape({xp}.stack(values, {axis}=-1), batch + shape)
@@ -286,7 +286,7 @@ _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
     "numpy": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; so do results.",
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}), whose batch axes broadcast.",
         imports="import numpy as np\nfrom numpy import {}",
         helpers=_demand('x.dtype.kind not in "biuf"', numbers="real numbers"),
         first_lines=_shapes,
@@ -295,9 +295,9 @@ DIALECTS = {
         values="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
     ),
     "array": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}) of any array API namespace, type and device;\n"
-        "they broadcast. PyTorch's tensors need array-api-compat. No array is written in place.\n"
-        "check(xp) runs the test vectors in a namespace, for example check(jax.numpy).",
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any array API namespace, type and\n"
+        "device, whose batch axes broadcast. PyTorch's tensors need the package array-api-compat. No array\n"
+        "is changed in place. check(xp) runs the test vectors in a namespace, for example check(jax.numpy).",
         imports="import numpy",
         helpers=_NAMESPACE
         + "\n"
@@ -318,7 +318,8 @@ DIALECTS = {
         single=True,
     ),
     "numba": Dialect(
-        about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
+        about="Arguments are float64 arrays of one configuration: q ({nq},), v and a ({nv},).\n"
+        "The first call of a function compiles the function.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
         decorator='@njit(error_model="numpy")',
         first_lines=_lengths('"{x} needs {width} numbers"'),  # Numba supports only constant messages
@@ -326,9 +327,9 @@ DIALECTS = {
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}) of any precision, which broadcast; for jit, vmap\n"
-        "and grad.\n"
-        "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision, whose batch axes\n"
+        "broadcast. The functions support jit, vmap and grad.\n"
+        "XLA's fusion pass takes minutes to compile long chains; this line disables the pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         helpers=_demand("not jnp.issubdtype(x.dtype, jnp.floating)")
@@ -352,8 +353,9 @@ DIALECTS = {
         single=True,
     ),
     "torch": Dialect(
-        about="Tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device, which broadcast;\n"
-        "for autograd, torch.func, vmap and compile. Kinematics() has the functions as a module.",
+        about="Arguments are tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device,\n"
+        "whose batch axes broadcast. The functions support autograd, torch.func, vmap and compile.\n"
+        "Kinematics() is a torch.nn.Module with these functions.",
         imports="import torch\nfrom torch import {}",
         helpers=_demand("not x.is_floating_point()", array="a tensor", is_array="isinstance(x, torch.Tensor)")
         + "\n"
@@ -371,7 +373,8 @@ DIALECTS = {
         '        print("good" if good else "WRONG", f"{name}: derivatives by gradcheck (float64)")\n',
     ),
     "casadi": Dialect(
-        about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian has {nv} times 6 rows.",
+        about="Arguments are columns SX, MX or DM: q ({nq}), v and a ({nv}).\n"
+        "A Hessian has {nv} times 6 rows.",
         imports="import casadi\nfrom casadi import {}",
         helpers=_VECTOR,
         first_lines=_demands,
@@ -381,16 +384,16 @@ DIALECTS = {
         ),
     ),
     "sympy": Dialect(
-        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}). Each result is a Matrix. A Hessian has"
-        " {nv} times 6 rows and {nv} columns.",
+        about="Arguments are lists of symbols or numbers: q ({nq}), v and a ({nv}).\n"
+        "Each result is a Matrix. A Hessian has {nv} times 6 rows and {nv} columns.",
         imports="import sympy\nfrom sympy import {}",
         first_lines=_lengths(_FOUND),
         result=_nested("sympy.Matrix([", "])"),
         values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),
     ),
     "sympy-exact": Dialect(
-        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}). Each result is a Matrix of exact\n"
-        "numbers. A Hessian has {nv} times 6 rows and {nv} columns.\n"
+        about="Arguments are lists of symbols or numbers: q ({nq}), v and a ({nv}).\n"
+        "Each result is a Matrix of exact numbers. A Hessian has {nv} times 6 rows and {nv} columns.\n"
         "For example: placement(sympy.symbols('q:{nq}'))",
         imports="import types\n\nimport mpmath\nfrom sympy import Matrix, Rational, pi\nfrom sympy import {}",
         first_lines=_lengths(_FOUND),
@@ -493,9 +496,9 @@ _BOTH = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
 
 
 def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
-    yield "\n# Configurations, true values at fifty digits, and tolerances in eps = 2^-52."
+    yield "\n# Test vectors: inputs, true values at fifty digits, and tolerances in eps = 2^-52."
     if dialect.single:
-        yield "# SINGLE: tolerances in single precision, in eps = 2^-23."
+        yield "# SINGLE contains tolerances in single precision, in eps = 2^-23."
     vectors = code.proof.vectors
     yield "INPUTS = {" + ", ".join(f'"{f.name}": "{f.inputs}"' for f in code.functions) + "}"
     yield "GIVEN = {"
