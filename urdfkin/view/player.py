@@ -8,17 +8,16 @@ from __future__ import annotations
 import io
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from urdfkin.errors.escape import markdown_text
+from urdfkin.model.tree import FloatArray
+from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import frame_motion
 from urdfkin.robot.trajectory import Trajectory
 from urdfkin.view.plot import foot
-
-if TYPE_CHECKING:
-    from urdfkin.view.viewer import Viewer
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 #: Maximum number of updates per second while the viewer plays
@@ -27,10 +26,24 @@ _UPDATE_RATE = 20.0
 _FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)
 
 
+class Screen(Protocol):
+    """The part of a `Viewer` that a `Player` uses; importing `Viewer` would make an import cycle."""
+
+    server: Any
+    robot: Robot
+    frame: Any
+    reference: Any
+
+    @property
+    def file_name(self) -> str: ...
+
+    def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None: ...
+
+
 class Player:
     """The controls of a trajectory; `sample` is the index of the sample that the viewer shows."""
 
-    def __init__(self, viewer: Viewer, trajectory: Trajectory) -> None:
+    def __init__(self, viewer: Screen, trajectory: Trajectory) -> None:
         self._viewer, self.trajectory, self.sample = viewer, trajectory, 0
         self._playing, self._is_setting = threading.Event(), False
         gui, t = viewer.server.gui, trajectory.t
