@@ -141,7 +141,7 @@ def test_a_worker_without_a_parent_does_not_start_and_a_disagreement_keeps_its_e
 def test_only_the_first_signal_interrupts_and_the_handlers_are_restored() -> None:
     before = [signal.getsignal(each) for each in (signal.SIGTERM, signal.SIGHUP)]
     try:
-        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # nohup
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as the command nohup does
         with stoppable() as stop:
             os.kill(os.getpid(), signal.SIGHUP)
         assert stop.signal is None

@@ -64,7 +64,7 @@ def opened(
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     chrome = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    chrome.set_script_timeout(120)  # a busy machine is no error
+    chrome.set_script_timeout(120)  # a script may take long on a busy machine
     try:
         if not draws:
             chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": _NOTHING_DRAWN})

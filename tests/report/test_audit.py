@@ -48,7 +48,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield browser
 
 
-@pytest.mark.parametrize(("width", "dark"), [(390, False), (1280, True)], ids=["390-light", "1280-dark"])
+@pytest.mark.parametrize(("width", "dark"), [(390, False), (768, True)], ids=["390-light", "768-dark"])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_page_has_no_serious_violation_no_error_no_horizontal_scrolling_and_no_request(
     name: str, width: int, dark: bool, pages: dict[str, Page], desk: Browser

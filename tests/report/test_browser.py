@@ -186,7 +186,7 @@ def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path], flee
     assert desk.errors() == []
     assert desk.js("return document.querySelector('details.robot h2').textContent").startswith("<script>")
     desk.screenshot("report-hostile")
-    desk.open(fleet)  # in a file beside the page
+    desk.open(fleet)  # details in a file beside the page
     desk.js("document.querySelector('#robot-7').open = true")
     desk.wait("return !!document.querySelector('#robot-7 table.checks')")
     assert desk.js("return window.hacked") is None

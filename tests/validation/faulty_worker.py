@@ -57,7 +57,7 @@ def run_faulty(chunk: Chunk) -> ChunkResult:
 
 
 def serve(pipe: int, parent: int) -> None:
-    if os.environ[FAULT] == "hang":  # as compiled code does, which handles no signal
+    if os.environ[FAULT] == "hang":  # like compiled code, which handles no signal
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         time.sleep(600)
     setattr(answer, "run_chunk", run_faulty)  # noqa: B010  mypy refuses an assignment to a function

@@ -69,7 +69,7 @@ def test_an_interrupted_study_resumes_and_gives_the_report_of_one_run(
     assert stored(store).interrupted
     assert "accuracy study: 1 of 2 robots" in urdfkin("report status", store).text
     study.interrupted_at = ""
-    assert urdfkin(*COMMAND, "--store", store, "--json", str(again)).code == 2  # of the missing robot
+    assert urdfkin(*COMMAND, "--store", store, "--json", str(again)).code == 2  # because of the missing robot
     assert study.robots == STUDIED
     assert results(again) == expected
     assert expected[1] is None

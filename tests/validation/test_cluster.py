@@ -43,7 +43,7 @@ from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput, subject
 
-pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("ignore")]  # Dask's own, on its way out
+pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("ignore")]  # Dask warns when it shuts down
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 SAMPLES = 150
@@ -73,11 +73,11 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cluste
     how: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
     with (
         pytest.MonkeyPatch.context() as patch,
-        # Dask never replaces a worker whose successor takes longer than this; its own value is 15 s.
+        # Time within which Dask must have started a replacement of a lost worker; the default is 15 s.
         dask.config.set({"distributed.deploy.lost-worker-timeout": "600s"}),
         LocalCluster(n_workers=2, local_directory=folder, **how) as there,
     ):
-        # Dask's own workers import the main module again, which would run these tests where it has no guard.
+        # Dask's workers import the main module again, which could start these tests again.
         patch.delattr(sys.modules["__main__"], "__file__", raising=False)
         with connected(there.scheduler_address) as found:
             yield found, there
@@ -310,7 +310,7 @@ def _serial() -> str:
 
 
 def test_the_number_of_workers_may_change_from_none_to_two_and_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    # Dask's own workers import the main module again, which would run these tests where it has no guard.
+    # Dask's workers import the main module again, which could start these tests again.
     monkeypatch.delattr(sys.modules["__main__"], "__file__", raising=False)
     counts = list[int]()
     with LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address="127.0.0.1:0") as there:
@@ -320,7 +320,7 @@ def test_the_number_of_workers_may_change_from_none_to_two_and_one(monkeypatch: 
             counts.append(len(there.scheduler.workers))
             if state.chunks_done == 8:
                 scaled.maximum = 1
-            time.sleep(0.2)  # Dask looks once a second
+            time.sleep(0.2)  # Dask changes the number of workers once a second
 
         def tell(message: str) -> None:
             if "workers; dashboard: http://127.0.0.1:" in message:
@@ -341,7 +341,7 @@ def test_another_version_is_refused_before_any_work(two: Cluster, monkeypatch: p
     words = r"different versions of the code: found pin 4\S* on the cluster and 3"
     with pytest.raises(ClusterError, match=words):
         cluster._check_versions(two._client)
-    report = validate("planar_two_link", samples=0, executor=two)  # as with a worker that starts later
+    report = validate("planar_two_link", samples=0, executor=two)  # the check of a worker that starts later
     assert "the cluster and this machine have different versions of the code" in str(report.robots[0].reason)
 
 

@@ -163,7 +163,7 @@ def test_a_reversed_joint_and_exchanged_joints_are_named(name: str, quantity: st
     check_diagnosis(check(name, quantity, wrong(exchange)), f"{one!r} and {other!r} are exchanged")
 
 
-@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # an inertia of the PR2
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # the PR2's file has a warning about an inertia
 @pytest.mark.parametrize("name", MIMICS)
 def test_a_missing_mimic_column_is_named(name: str) -> None:
     robot = robot_of(name)

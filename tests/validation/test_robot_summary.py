@@ -93,7 +93,7 @@ def test_an_infinite_disagreement_is_null_in_the_document(monkeypatch: pytest.Mo
     assert check["failed"] == check["results"]
 
 
-# -- commands that repeat --------------------------------------------------------------------------
+# -- commands that compute a result again ----------------------------------------------------------
 
 
 #: A link and another joint have the same name.

@@ -1,7 +1,7 @@
 """Test vectors: their values, tolerances, files and readers.
 
-The values are computed a second time by `tests/urdf_standard.py`, and the tolerances from the formulas of
-docs/vectors.md. Both share no code with urdfkin.
+`tests/urdf_standard.py` computes the values a second time, without code of urdfkin. The tolerances are
+computed a second time from the formulas in docs/vectors.md.
 """
 
 import hashlib
@@ -38,7 +38,7 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples" / "vectors"
 EPS = 2.0**-52
 FACTORS = {"placement": 1, "velocity": 2, "jacobian": 2}
-#: Features whose values the quick test computes a second time: each kind of joint, rule and number.
+#: Features of the fast test; they have each kind of joint, mimic rule and number.
 SOME = (
     "skew axis of any length", "order of rpy", "quat_xyzw of length 2 (URDF 1.1)", "planar", "floating",
     "mimic chain of three", "mimic joint nearer the base", "two joints follow one", "mimic with multiplier 0",
@@ -51,7 +51,7 @@ wrong: Callable[..., Iterator[str]] = module_of(EXAMPLES / "compare.py").wrong
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The vectors of all features."""
+    """Folder with the test vectors of all features."""
     made = tmp_path_factory.mktemp("vectors")
     write_sums(made, list(write_features(made)))
     return made
@@ -111,7 +111,7 @@ def test_an_implementation_written_from_the_standard_agrees_for_catalogue(name: 
 
 
 def own(robot: urdfkin.Robot) -> Callable[..., Any]:
-    """Return the answers of urdfkin in doubles."""
+    """Return a function that computes each quantity with urdfkin."""
 
     def answer(quantity: str, frame: str, reference: str, q: Any, v: Any, a: Any) -> Any:
         if quantity == "placement":
@@ -130,7 +130,7 @@ def own(robot: urdfkin.Robot) -> Callable[..., Any]:
     return answer
 
 
-def test_the_results_of_urdfkin_in_doubles_take_a_small_part_of_the_tolerances(folder: Path) -> None:
+def test_the_errors_of_urdfkin_are_at_most_a_twentieth_of_the_tolerances(folder: Path) -> None:
     for name, feature in features().items():
         path = folder / f"{stem(name)}.json"
         answer = own(urdfkin.load(feature.text, verify=False))
@@ -146,12 +146,12 @@ def test_the_results_of_urdfkin_in_doubles_take_a_small_part_of_the_tolerances(f
 
 
 class Sizes:
-    """The sizes and the roundings of a link in a sample, from the formulas of docs/vectors.md."""
+    """Sizes of terms and number of roundings for a link in a sample, by the formulas in docs/vectors.md."""
 
     def __init__(self, robot: Robot, link: str, sample: Mapping[str, Any], joints: Sequence[Any]) -> None:
         self.robot, self.path = robot, robot.path(link)
         at = {one["name"]: one for one in joints}
-        #: Place, |m|, whether it turns, place of the joint on the path.
+        #: For each column: index in v, |multiplier|, whether the joint is revolute, index of the joint.
         self.columns = list[tuple[int, float, bool, int]]()
         self.p = self.w = self.u = self.d = self.c = e = 0.0
         rules = 0
@@ -208,7 +208,7 @@ class Sizes:
         return (FACTORS.get(quantity, 3) + (reference in ("local", "world"))) * self.roundings
 
     def of(self, quantity: str, reference: str | None) -> np.ndarray:
-        """The sizes of all numbers."""
+        """Return the sizes of the terms of all numbers."""
         p, w, u, d, c, nv = self.p, self.w, self.u, self.d, self.c, self.nv
         world, local = reference == "world", reference == "local"
         if quantity == "placement":
@@ -258,14 +258,15 @@ def demand_the_tolerances_of_the_page(path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", features())
-def test_every_tolerance_is_that_of_the_formulas_on_the_page(name: str, folder: Path) -> None:
+def test_the_formulas_on_the_page_give_every_tolerance(name: str, folder: Path) -> None:
     demand_the_tolerances_of_the_page(folder / f"{stem(name)}.json")
 
 
 def chained(rng: np.random.Generator, large: bool) -> str:
     """Return a URDF with a chain of two to four mimic rules.
 
-    The offsets cancel or, if `large`, the last one is a little above a power of two and rounds the most.
+    The offsets cancel. If `large`, the last offset is slightly above a power of two and has the largest
+    rounding error.
     """
     constant, parts, count = Decimal(0), list[str](), int(rng.integers(3, 6))
     for k in range(count):
@@ -289,7 +290,7 @@ def chained(rng: np.random.Generator, large: bool) -> str:
 
 
 def one_by_one(text: str) -> Callable[..., Any]:
-    """Return the placements of a program that applies the mimic rules one after the other, in doubles."""
+    """Return a function that applies the mimic rules one after the other and then computes placements."""
     free = urdfkin.load(text, verify=False, mimic=False)
     rules = [
         tuple(float(rule.get(name, "")) for name in ("multiplier", "offset"))
@@ -343,7 +344,7 @@ def changed(data: Mapping[str, Any], which: int) -> Iterator[tuple[dict[str, Any
 
 
 def in_turn(rows: Sequence[Sequence[float]]) -> Callable[..., Any]:
-    """Return the answers of a library that are known: one row for each call."""
+    """Return a function that returns one row for each call."""
     found = iter(rows)
     return lambda *_: next(found)
 
@@ -362,7 +363,7 @@ def test_the_reader_in_python_finds_every_number_changed_by_a_billionth(which: i
     assert len(kinds) == 19
 
 
-def test_the_reader_reports_nan_and_a_wrong_shape_and_stands_on_the_page(folder: Path) -> None:
+def test_the_reader_reports_nan_and_a_wrong_shape_and_the_page_contains_the_reader(folder: Path) -> None:
     path = folder / "mimic.json"
     assert len(list(wrong(path, lambda *_: np.full(16, np.nan)))) == 3 * 16 + 3 * 18
     assert "1 numbers, expected 16" in next(wrong(path, lambda *_: 1.0))
@@ -372,7 +373,7 @@ def test_the_reader_reports_nan_and_a_wrong_shape_and_stands_on_the_page(folder:
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The reader in C++."""
+    """The compiled reader in C++."""
     if shutil.which("g++") is None:
         pytest.skip("no C++ compiler")
     made = tmp_path_factory.mktemp("reader") / "compare"
@@ -467,7 +468,7 @@ def test_all_files_with_the_catalogue_are_written_twice_the_same(tmp_path: Path)
     assert all(one["k"] * EPS < 1e-10 for data in found for one in data["samples"][1]["results"])
 
 
-def test_the_features_are_many_have_names_of_their_own_and_notes_on_libraries_that_differ() -> None:
+def test_features_have_unique_names_and_notes_on_libraries_that_differ() -> None:
     assert len(features()) >= 60
     names = [stem(name).casefold() for name in (*features(), *catalogue())]
     assert len(set(names)) == len(names)
@@ -489,7 +490,9 @@ def test_the_features_are_many_have_names_of_their_own_and_notes_on_libraries_th
 # -- the command ----------------------------------------------------------------------------------------
 
 
-def test_a_robot_of_the_catalogue_is_written_by_reference_and_others_with_a_file(tmp_path: Path) -> None:
+def test_vectors_of_a_catalogue_robot_have_no_urdf_file_and_vectors_of_other_robots_have_one(
+    tmp_path: Path,
+) -> None:
     text = urdfkin.load("planar_two_link").urdf
     (tmp_path / "mine.urdf").write_text(text.replace('"planar_two_link"', '"my arm"'))
     done = good(

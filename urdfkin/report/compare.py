@@ -174,7 +174,7 @@ _SHARE_FLOOR = 0.1
 
 @dataclass(frozen=True, slots=True)
 class ReportChange:
-    """One difference of two reports.
+    """A difference between two reports.
 
     Attributes:
         robot: The robot's source; None for the run as a whole.
@@ -222,7 +222,7 @@ class ReportComparison:
 
 
 class ChangeEntry(TypedDict):
-    """One difference of two reports."""
+    """A difference between two reports."""
 
     robot: Annotated[str | None, says("Source of the robot; null if the value does not belong to one robot.")]
     what: Annotated[str, says("Name of the changed value.")]

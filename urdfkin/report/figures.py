@@ -124,10 +124,9 @@ _KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 def scene(model: ReportedModel, chains: list[Chain]) -> dict[str, Any]:
     """Return a robot as data for the script of the page, `assets/view3d.js`.
 
-    The entry `joints` contains a list for each joint: the name, the index of the kind, the parent link, the
-    child link, the pose in the parent (three rows of four), the axis or 0, the index in q or -1, the lower
-    and the upper limit (None: no limit), and the mimic rule or 0. A mimic rule is the mimicked joint's index
-    in q, the multiplier and the offset.
+    The entry `joints` contains a list for each joint: name, index of the kind, parent link, child link, pose
+    in the parent (three rows of four), axis or 0, index in q or -1, lower limit, upper limit (None: no
+    limit), mimic rule or 0. A mimic rule is the mimicked joint's index in q, the multiplier and the offset.
     """
     links = {name: i for i, name in enumerate(model["links"])}
     joints = {joint["name"]: i for i, joint in enumerate(model["joints"])}

@@ -174,8 +174,7 @@ def renamed(found: Sameness) -> list[str]:
 
 def document(found: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
     """Return the answer with reasons; with `all_`, all lines, otherwise at most `SHOWN` of each kind."""
-    sources = zip("AB", found.names, found.sources, strict=True)
-    parts: list[str | Table] = [f"{which}: {name} ({source})" for which, name, source in sources]
+    parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(found), strict=True)]
     head = headline(found, question)
     parts.append(Strong(head, "bold green" if found.holds(question) else "bold red"))
     some = None if all_ else SHOWN
@@ -187,13 +186,21 @@ def document(found: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool
     frames = far_frames(found)
     if frames:
         parts.append(f"{farthest(found).lower()}:")
-        parts += [Table(HEADS, rows(frames[:some])), *_rest(len(frames), some)]
-        if off := attained(frames[0]):
-            parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
+        parts += [Table(HEADS, rows(frames[:some])), *_rest(len(frames), some), *_worst_case(found, frames)]
     parts += _lines(NARROWED, found.narrowed, some)
     parts += _lines("different names", renamed(found), some)
     parts += _lines("differences without effect on motion", [one.words for one in found.remarks], some)
     return TextDocument("", [*parts, str(found.checked)])
+
+
+def _names(found: Sameness) -> list[str]:
+    return [f"{name} ({source})" for name, source in zip(found.names, found.sources, strict=True)]
+
+
+def _worst_case(found: Sameness, frames: Sequence[Interval]) -> list[str]:
+    """Return a line about the distance of the first frame and the configuration, if there is a distance."""
+    off = attained(frames[0])
+    return [f"{frames[0].frame} is {off} off at: {where(found, frames[0])}"] if off else []
 
 
 def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
@@ -244,8 +251,7 @@ def pairs_markdown(found: Sequence[Sameness], question: SameQuestion = EQUIVALEN
 
 def as_document(found: Sameness) -> TextDocument:
     """Return the verdict, its reasons and the frames with the largest distances, for `print`."""
-    a, b = (f"{name} ({source})" for name, source in zip(found.names, found.sources, strict=True))
-    parts: list[str | Table] = [f"A: {a}", f"B: {b}"]
+    parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(found), strict=True)]
     after, words = _reasons(found)
     for head, lines in (
         ("Change of B", [*after, as_written(found)] if after else []),
@@ -257,16 +263,15 @@ def as_document(found: Sameness) -> TextDocument:
     if frames := far_frames(found):
         parts += [f"{farthest(found)}:", Table(HEADS, rows(frames[:SHOWN]))]
         parts += [f"... and {len(frames) - SHOWN} more frames"] if len(frames) > SHOWN else []
-        if off := attained(frames[0]):
-            parts.append(f"{frames[0].frame} is {off} off at: {where(found, frames[0])}")
+        parts += _worst_case(found, frames)
     return TextDocument(headline(found), [*parts, str(found.checked)])
 
 
 def attained(frame: Interval) -> str:
     """Return in words the distance of two frames at the worst configuration; empty if they coincide."""
-    parts = [length(frame.lower)] if frame.lower else []
-    parts += [angle(frame.radians_seen)] if frame.radians_seen and not frame.lower else []
-    return " and ".join(parts)
+    if frame.lower:
+        return length(frame.lower)
+    return angle(frame.radians_seen) if frame.radians_seen else ""
 
 
 def _lines(head: str, lines: Sequence[str], some: int | None) -> list[str]:
@@ -283,9 +288,7 @@ def _rest(n: int, some: int | None) -> list[str]:
 def markdown_of(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     mark = "✅" if found.holds(question) else "❌"
     text = markdown_text
-    names = " and ".join(
-        text(f"{name} ({source})") for name, source in zip(found.names, found.sources, strict=True)
-    )
+    names = " and ".join(map(text, _names(found)))
     lines = [f"## {mark} {text(headline(found, question))}", "", names, ""]
     after, reasons = _reasons(found)
     for head, words in (

@@ -52,8 +52,6 @@ _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
-#: urdfkin is less accurate if its typical or worst error exceeds FACTOR times Pinocchio's error.
-FACTOR = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,14 +82,6 @@ class AccuracyLine:
     numbers: int
     urdfkin: Errors
     pinocchio: Errors
-
-    @property
-    def ours_is_worse(self) -> bool:
-        """Whether the typical or worst error of urdfkin is more than `FACTOR` times Pinocchio's."""
-        return (
-            self.urdfkin.typical > FACTOR * self.pinocchio.typical
-            or self.urdfkin.worst > FACTOR * self.pinocchio.worst
-        )
 
 
 @dataclass(frozen=True, slots=True)

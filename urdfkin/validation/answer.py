@@ -35,8 +35,8 @@ class Failure:
         verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
         summary: Summary of the readable parts of the robot.
         error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the process or the cluster caused the failure, not the robot. Such a failure is not
-            stored, so that a resumed run computes the chunk again.
+        passing: Whether the process or the cluster caused the failure, not the robot. A passing failure is
+            not stored, so that a resumed run computes the chunk again.
     """
 
     verdict: ValidationVerdict

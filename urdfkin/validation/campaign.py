@@ -80,8 +80,8 @@ def validate(
         xacro_args: As in `load`, for each .xacro file among the robots.
         lock: As in `load`, for each robot.
         joints: As in `load`, for each robot.
-        oracle: "mujoco": also compare every frame with MuJoCo. If only two of the three libraries agree, the
-            report names the third library. This needs the extra `mujoco`.
+        oracle: "mujoco": also compare every frame with MuJoCo, which needs the extra `mujoco`. If only two of
+            the three libraries agree, the report names the third library.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
             robot is reported as not verified with the reason, and the other robots continue.
         executor: An executor that runs the chunks; None: local processes run them. The executor has the

@@ -1,7 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-Results of adjacent chunks are added as they arrive, so memory does not grow with the number of samples. They
-are added in the order of the chunks, so the sums do not depend on the order of arrival.
+Results of adjacent chunks are added as they arrive, so memory does not grow with the number of samples. The
+order of the addition is the order of the chunks, so the sums do not depend on the order of arrival.
 """
 
 from __future__ import annotations

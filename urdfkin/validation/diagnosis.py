@@ -87,8 +87,8 @@ class Diagnosis:
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     """Return at most three sentences about the mistakes that explain the results.
 
-    Each mistake is also combined with exchanged linear and angular halves of the six-vectors. Such a
-    combination is named only if no single mistake explains the results.
+    Each mistake is also combined with exchanged linear and angular halves of the six-vectors. A combination
+    is named only if no single mistake explains the results.
     """
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.exchanged_halves

@@ -20,8 +20,7 @@ from typing import Protocol
 from urdfkin.validation.answer import Answer, Failure, answer, lost_failure
 from urdfkin.validation.chunk import Chunk
 
-#: Maximum number of chunks in an executor's queue.
-#: This number is enough for many workers, and small enough to save memory.
+#: Maximum number of chunks in an executor's queue: enough for many workers, and few enough to save memory.
 IN_FLIGHT = 512
 
 

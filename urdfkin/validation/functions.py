@@ -375,7 +375,7 @@ class _Run:
     def check(self) -> FunctionCheck:
         robot = self.robot
         drawn = draw(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
-        total = _Total(self.row, self.factor, self._row_names(), self._column_names())
+        total = _Total(self._row_names(), self._column_names())
         checked = robot.verifier.cannot(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _BATCH):
             part = slice(first, first + _BATCH)
@@ -588,8 +588,12 @@ class _Run:
 
 @dataclass
 class _Total:
-    row: Quantity
-    factor: float
+    """Maxima and sums over the batches of configurations.
+
+    Attributes:
+        kept: The first batch with a result of the right shape, for the diagnosis.
+    """
+
     row_names: tuple[str, ...]
     column_names: tuple[str, ...]
     compared: int = 0
