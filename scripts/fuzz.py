@@ -63,7 +63,7 @@ class Worker:
         self.work, self.timeout = work, timeout
         self.process: BaseProcess | None = None
 
-    def judge(self, family: str, number: int) -> tuple[str, str]:
+    def evaluate(self, family: str, number: int) -> tuple[str, str]:
         """Test a document; return the outcome and its details; a crash and a hang are possible outcomes."""
         if self.process is None:
             self.start()
@@ -99,15 +99,15 @@ class Worker:
 
 def work(seed: int, pipe: Connection) -> None:
     """Main function of the worker process: receive a family and a number, send the outcome, and repeat."""
-    from scripts.fuzzing.judge import judge
+    from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)
     os.dup2(nothing, 2)
-    judge(Case("as it is", files()[0].read_bytes()))
+    evaluate(Case("as it is", files()[0].read_bytes()))
     pipe.send(READY)
     while True:
-        outcome = judge(case(seed, *pipe.recv()))
+        outcome = evaluate(case(seed, *pipe.recv()))
         pipe.send((outcome.word, outcome.details))
 
 
@@ -120,7 +120,7 @@ def fuzz(
     def run(_: int) -> None:
         worker = Worker(partial(work, seed), timeout)
         for family, number in waiting:
-            word, details = worker.judge(family, number)
+            word, details = worker.evaluate(family, number)
             counts[word] += 1
             if word not in GOOD:
                 made = case(seed, family, number)

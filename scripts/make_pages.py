@@ -1,7 +1,7 @@
-"""Write the generated parts of pages: equations, performance, findings, reports, judge, enclosures.
+"""Write the generated parts of pages: equations, performance, findings, reports, accuracy, enclosures.
 
     python scripts/make_pages.py                  # all pages
-    python scripts/make_pages.py findings judge   # some pages
+    python scripts/make_pages.py findings accuracy   # some pages
 
 Run this script after a change of an equation, a finding, a robot or a schema. Tests compare the pages
 with the output of this script. The accuracy study and the enclosures take minutes, so tests check only a part
@@ -278,7 +278,7 @@ def askew(length: int) -> str:
 PARTS: dict[str, Callable[[], dict[str, str]]] = {
     "findings": findings,
     "reports": reports,
-    "judge": study,
+    "accuracy": study,
     "enclosures": enclosures,
 }
 PAGES = ("equations", "performance", *PARTS)

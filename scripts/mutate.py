@@ -150,7 +150,7 @@ def mutants(parts: list[str]) -> list[Mutant]:
     return found
 
 
-def judge(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
+def evaluate(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
     """Run the tests on a mutant until one fails."""
     if (mutant.place, mutant.what) in argued():
         return Outcome(mutant, "argued", "docs/mutation.md")
@@ -163,7 +163,7 @@ def judge(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = F
     return Outcome(mutant, word, by)
 
 
-def judge_named(slip: Named, *, timeout: float) -> Outcome:
+def evaluate_named(slip: Named, *, timeout: float) -> Outcome:
     """Run the test that must fail for this mutant."""
     texts = json.dumps([slip.before, slip.after])
     word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
@@ -233,13 +233,13 @@ def main() -> int:
     asks: list[Callable[[], Outcome]]
     if options.named:
         named = [slip for slip in named_slips() if not options.parts or slip.module in modules]
-        asks = [partial(judge_named, slip, timeout=options.timeout) for slip in named]
+        asks = [partial(evaluate_named, slip, timeout=options.timeout) for slip in named]
     else:
         chosen = [mutant for mutant in mutants(options.parts) if options.only in (None, mutant.name)]
         if options.sample is not None and options.sample < len(chosen):
             chosen = random.Random(options.seed).sample(chosen, options.sample)
         how = {"timeout": options.timeout, "slow": options.slow, "whole": options.whole}
-        asks = [partial(judge, mutant, **how) for mutant in chosen]
+        asks = [partial(evaluate, mutant, **how) for mutant in chosen]
     if not asks:
         print("no mutant was selected; --count prints the number of mutants", file=sys.stderr)
         return 1

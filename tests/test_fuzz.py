@@ -17,7 +17,7 @@ import pytest
 import urdfkin
 from scripts import fuzz
 from scripts.fuzzing import GOOD, Case, Outcome, mjcf, robots
-from scripts.fuzzing.judge import judge as judge_case
+from scripts.fuzzing.evaluate import evaluate as evaluate_case
 from scripts.fuzzing.mutations import FAMILIES, mutant
 from tests.urdf.lint.cases.arm import arm, fixed
 from urdfkin.compiled.prepared import PreparedFrame
@@ -28,8 +28,8 @@ from urdfkin.verify import mjcf_check
 pytestmark = pytest.mark.long
 
 
-def judge(text: str) -> Outcome:
-    return judge_case(Case("by hand", text.encode()))
+def evaluate(text: str) -> Outcome:
+    return evaluate_case(Case("by hand", text.encode()))
 
 
 def test_a_mutant_depends_on_seed_and_number_alone() -> None:
@@ -103,15 +103,15 @@ LARGE = arm(follow='<mimic joint="j1" multiplier="1e300"/>', more=_END)
     ],
 )
 def test_the_judge_tells_what_happened(text: str, word: str) -> None:
-    outcome = judge(text)
+    outcome = evaluate(text)
     assert outcome.word == word, outcome
     assert word in GOOD
 
 
 def test_a_check_that_is_blind_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(urdfkin, "check", lambda data, **options: [], raising=False)
-    assert judge(arm(axis='<axis xyz="0 0 0"/>')).word == "load refuses a file that check accepts"
-    assert judge(arm(origin='<origin xyz="0\t0 1"/>')).word not in GOOD
+    assert evaluate(arm(axis='<axis xyz="0 0 0"/>')).word == "load refuses a file that check accepts"
+    assert evaluate(arm(origin='<origin xyz="0\t0 1"/>')).word not in GOOD
 
 
 def test_a_traceback_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,7 +119,7 @@ def test_a_traceback_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyError(data)
 
     monkeypatch.setattr(urdfkin, "check", fails, raising=False)
-    assert judge(arm()).word == "traceback: KeyError"
+    assert evaluate(arm()).word == "traceback: KeyError"
 
 
 def test_what_only_pinocchio_refuses_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,7 +127,7 @@ def test_what_only_pinocchio_refuses_is_a_finding(monkeypatch: pytest.MonkeyPatc
         raise ValueError("no reason")
 
     monkeypatch.setattr(pinocchio, "buildModelFromXML", refuses)
-    outcome = judge(arm())
+    outcome = evaluate(arm())
     assert outcome.word == "Pinocchio refuses a file that check accepts"
     assert "no reason" in outcome.details
     assert "please report this" in outcome.details
@@ -137,7 +137,7 @@ def test_what_only_pinocchio_refuses_is_a_finding(monkeypatch: pytest.MonkeyPatc
 def test_numbers_that_differ_between_two_ways_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right: Any = PreparedFrame.velocity
     monkeypatch.setattr(PreparedFrame, "velocity", lambda *asked: np.nextafter(right(*asked), 1.0))
-    assert judge(arm()).word == "two computations of one result differ"
+    assert evaluate(arm()).word == "two computations of one result differ"
 
 
 def _fails(how: str, pipe: Connection) -> None:
@@ -159,7 +159,7 @@ def _fails(how: str, pipe: Connection) -> None:
 def test_a_worker_that_dies_or_hangs_is_an_outcome_and_is_replaced(how: str, word: str, details: str) -> None:
     worker = fuzz.Worker(partial(_fails, how), timeout=1.0)
     for _ in range(2):
-        assert worker.judge("names", 0) == (word, details)
+        assert worker.evaluate("names", 0) == (word, details)
     worker.stop(0.0)
 
 
@@ -174,7 +174,7 @@ def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("family", [*robots.FAMILIES, *mjcf.FAMILIES])
 def test_a_short_run_of_whole_robots_finds_nothing(family: str) -> None:
-    words = Counter(judge_case(fuzz.case(20, family, number)).word for number in range(5))
+    words = Counter(evaluate_case(fuzz.case(20, family, number)).word for number in range(5))
     assert set(words) <= set(GOOD), words
     assert words["verified"] > 2
 
@@ -201,11 +201,11 @@ def test_a_reading_of_mjcf_that_is_not_mujocos_is_noticed(monkeypatch: pytest.Mo
         '<mujoco><worldbody><body name="b"><freejoint name="f" align="true"/><geom size=".1" pos="1 0 0"/>'
         '<site name="s"/></body></worldbody></mujoco>'
     )
-    assert judge(text).word == "verified"
+    assert evaluate(text).word == "verified"
 
     def without_shapes(*arguments: Any) -> tuple[bytes, int | None]:
         output, status = ask_python(*arguments)
         return output.splitlines(keepends=True)[0], status
 
     monkeypatch.setattr(mjcf_check, "ask_python", without_shapes)
-    assert judge(text).word == "MuJoCo reads another robot"
+    assert evaluate(text).word == "MuJoCo reads another robot"

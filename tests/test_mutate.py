@@ -17,8 +17,8 @@ from scripts.mutate import (
     ROOT,
     Mutant,
     argued,
+    evaluate,
     files,
-    judge,
     main,
     module_of,
     mutants,
@@ -94,7 +94,7 @@ def test_what_no_test_looks_at_survives_and_what_one_does_is_noticed(
         encoding="utf-8",
     )
     monkeypatch.setattr("scripts.mutate.near_tests", lambda path: [str(test)])
-    assert judge(mutant, timeout=100.0).word == word
+    assert evaluate(mutant, timeout=100.0).word == word
 
 
 #: Parts of earlier versions.
@@ -115,7 +115,7 @@ def drawn(count: int) -> list[Mutant]:
 @pytest.mark.parametrize("mutant", drawn(6), ids=lambda mutant: str(mutant.name))
 def test_a_slip_drawn_by_a_seed_is_noticed_or_argued(mutant: Mutant) -> None:
     if (mutant.place, mutant.what) not in argued():
-        outcome = judge(mutant, timeout=300.0, slow=True)
+        outcome = evaluate(mutant, timeout=300.0, slow=True)
         assert outcome.word != "survived", f"{mutant.place}: {mutant.what}"
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.mutate import ROOT, Named, judge_named, named_slips
+from scripts.mutate import ROOT, Named, evaluate_named, named_slips
 from scripts.mutating.operators import rewritten
 
 SLIPS = named_slips()
@@ -25,7 +25,7 @@ def test_every_slip_can_still_be_made_and_its_test_is_there() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("slip", SLIPS, ids=[slip.claim.replace(" ", "-") for slip in SLIPS])
 def test_its_test_fails(slip: Named) -> None:
-    outcome = judge_named(slip, timeout=300.0)
+    outcome = evaluate_named(slip, timeout=300.0)
     assert outcome.word == "noticed", outcome.by
 
 

@@ -133,7 +133,7 @@ def test_a_manifest_or_a_cached_file_that_is_a_device_and_an_mjcf_file_that_is_a
     assert not mjcf.is_mjcf(tmp_path / "arm.xml")
 
 
-@pytest.mark.parametrize("name", ["manifest.json", "judge.json", "chunk"])
+@pytest.mark.parametrize("name", ["manifest.json", "accuracy.json", "chunk"])
 def test_a_file_of_a_store_that_is_a_link_to_a_device_is_not_read(name: str, tmp_path: Path) -> None:
     validate("planar_two_link", samples=10, store=tmp_path)
     (place,) = tmp_path.glob("chunks/*/*.chunk") if name == "chunk" else (tmp_path / name,)

@@ -49,11 +49,11 @@ def test_validate_writes_every_form_at_once(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_judge_says_that_the_base_moved_where_it_was_told_to(tmp_path: Path) -> None:
     data, page = tmp_path / "a.json", tmp_path / "a.html"
-    words = "validate", "polar", "--samples", "1", "--judge", "--judge-samples", "1", "--json", data
+    words = "validate", "polar", "--samples", "1", "--accuracy", "--accuracy-samples", "1", "--json", data
     still = urdfkin(*words)
-    before = json.loads(data.read_text())["robots"][0]["judge"]
-    moving = urdfkin(*words, "--judge-moving-base", "--html", page)
-    after = json.loads(data.read_text())["robots"][0]["judge"]
+    before = json.loads(data.read_text())["robots"][0]["accuracy"]
+    moving = urdfkin(*words, "--accuracy-moving-base", "--html", page)
+    after = json.loads(data.read_text())["robots"][0]["accuracy"]
     assert (still.code, moving.code) == (0, 0)
     assert "1 sample on a moving base" in moving.text
     assert "moving base" not in still.text

@@ -37,7 +37,7 @@ def refused() -> Any:
 def studied() -> Any:
     report = replace(validate("panda", samples=0), studies=(accuracy_study(load("panda"), samples=1),))
     document: Any = report.as_dict()
-    assert len(document["robots"][0]["judge"]["lines"]) > 5
+    assert len(document["robots"][0]["accuracy"]["lines"]) > 5
     return document
 
 

@@ -304,6 +304,6 @@ def test_errors_are_equal_only_if_they_are_the_same_double() -> None:
 
 def test_the_page_has_the_equal_lines_of_polar() -> None:
     lines = plain(accuracy_study(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
-    table = make_pages.path_of("judge").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
+    table = make_pages.path_of("accuracy").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
     rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
     assert [ours == theirs for ours, theirs in rows] == [more_accurate(line) == "equal" for line in lines]

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tests.cli.running import urdfkin
-from urdfkin.cli.validate import judge_all
+from urdfkin.cli.validate import study_all
 from urdfkin.errors import InputError
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
@@ -20,7 +20,7 @@ from urdfkin.validation.store import Store, open_store
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 STUDIED = ["planar_two_link", "double_pendulum"]
-COMMAND = ("validate", *ROBOTS, "--samples", "0", "--judge", "--judge-samples", "1")
+COMMAND = ("validate", *ROBOTS, "--samples", "0", "--accuracy", "--accuracy-samples", "1")
 
 
 class Recorder:
@@ -56,7 +56,7 @@ def expected(study: Recorder, tmp_path: Path) -> list[Any]:
 
 
 def results(path: Path) -> list[Any]:
-    return [robot["judge"] for robot in json.loads(path.read_text())["robots"]]
+    return [robot["accuracy"] for robot in json.loads(path.read_text())["robots"]]
 
 
 @pytest.mark.slow
@@ -74,7 +74,7 @@ def test_an_interrupted_study_resumes_and_gives_the_report_of_one_run(
     assert results(again) == expected
     assert expected[1] is None
     assert not stored(store).interrupted
-    assert json.loads(json.dumps([r["judge"] for r in stored(store).as_dict()["robots"]])) == expected
+    assert json.loads(json.dumps([r["accuracy"] for r in stored(store).as_dict()["robots"]])) == expected
 
 
 @pytest.mark.slow
@@ -84,12 +84,12 @@ def test_other_settings_of_the_study_reuse_no_result_and_keep_the_chunks(
     store = str(tmp_path)
     urdfkin(*COMMAND, "--store", store)
     chunks = sorted(tmp_path.glob("chunks/*/*.chunk"))
-    for command in ((*COMMAND[:-1], "2"), (*COMMAND, "--judge-moving-base")):
+    for command in ((*COMMAND[:-1], "2"), (*COMMAND, "--accuracy-moving-base")):
         study.robots = []
         urdfkin(*command, "--store", store)
         assert study.robots == STUDIED
     assert sorted(tmp_path.glob("chunks/*/*.chunk")) == chunks
-    assert len(list(tmp_path.glob("chunks/*/*.judged"))) == 6
+    assert len(list(tmp_path.glob("chunks/*/*.accuracy"))) == 6
     (first, *_) = stored(store).studies
     assert first is not None
     assert first.moving_base
@@ -110,12 +110,12 @@ def test_shards_study_each_robot_once_and_merge_to_the_report_of_one_run(
     urdfkin(*COMMAND[:-1], "2", "--store", shards[1][1], "--shard", "2/2")
     again_merged = urdfkin("report merge", whole, *(store for _, store in shards))
     assert again_merged.code == 2
-    assert "--judge-samples 2 --seed 0, and --judge-samples 1 --seed 0 in" in again_merged.err
+    assert "--accuracy-samples 2 --seed 0, and --accuracy-samples 1 --seed 0 in" in again_merged.err
 
 
 def test_a_damaged_result_is_reported_and_computed_again(study: Recorder, tmp_path: Path) -> None:
     urdfkin(*COMMAND, "--store", str(tmp_path))
-    for i, place in enumerate(sorted(tmp_path.glob("chunks/*/*.judged"))):
+    for i, place in enumerate(sorted(tmp_path.glob("chunks/*/*.accuracy"))):
         content = place.read_bytes()
         place.write_bytes(content[:-1] if i else content[:60] + bytes([content[60] ^ 1]) + content[61:])
     study.robots = []
@@ -124,7 +124,7 @@ def test_a_damaged_result_is_reported_and_computed_again(study: Recorder, tmp_pa
     again = urdfkin(*COMMAND, "--store", str(tmp_path))
     assert again.err.count("is computed again") == 2
     assert study.robots == STUDIED
-    (tmp_path / "judge.json").write_text("{}")
+    (tmp_path / "accuracy.json").write_text("{}")
     with pytest.warns(StoreWarning, match="cannot be read"):
         assert stored(tmp_path).studies == ()
 
@@ -148,10 +148,10 @@ def test_a_text_that_changed_since_its_comparison_is_not_studied(study: Recorder
     report = validate([str(robot)], samples=0, store=store)
     robot.write_text('<robot name="b"><link name="l"/></robot>')
     how = {"mimic": None, "root_joint": None, "xacro_args": None}
-    found = judge_all(report, [str(robot)], StudySettings(1, 0, False), store=store, how=how)
+    found = study_all(report, [str(robot)], StudySettings(1, 0, False), store=store, how=how)
     assert found.studies == (None,)
     assert study.robots == []
-    assert not list(store.glob("chunks/*/*.judged"))
+    assert not list(store.glob("chunks/*/*.accuracy"))
 
 
 def test_a_result_is_read_back_to_the_last_bit(tmp_path: Path) -> None:

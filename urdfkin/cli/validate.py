@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from urdfkin.validation.results import ValidationReport
 
 
-def judge_all(
+def study_all(
     report: ValidationReport,
     given: Sequence[Robot | str],
     settings: StudySettings,
@@ -168,18 +168,20 @@ def _with_quantities(command: _T) -> _T:
 )
 @click.option("--json-progress", is_flag=True, help="Print progress as lines of JSON on standard error.")
 @click.option(
-    "--judge",
-    "judged",
+    "--accuracy",
+    "with_study",
     is_flag=True,
     help="Also study the accuracy: compare urdfkin and Pinocchio with results computed at 50 digits.",
 )
 @click.option(
-    "--judge-samples",
+    "--accuracy-samples",
     type=WholeNumber(1),
     default=5,
-    help="With --judge: number of random configurations of each robot.",
+    help="With --accuracy: number of random configurations of each robot.",
 )
-@click.option("--judge-moving-base", is_flag=True, help="With --judge: also move the root link at random.")
+@click.option(
+    "--accuracy-moving-base", is_flag=True, help="With --accuracy: also move the root link at random."
+)
 @report_options
 @click.pass_context
 def command(
@@ -187,9 +189,9 @@ def command(
     /,
     robots: tuple[str, ...],
     all_: bool,
-    judged: bool,
-    judge_samples: int,
-    judge_moving_base: bool,
+    with_study: bool,
+    accuracy_samples: int,
+    accuracy_moving_base: bool,
     scheduler: str | None,
     json_progress: bool,
     cases: bool,
@@ -233,7 +235,7 @@ def command(
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
-    given = [_load_stdin(robot, how) if judged else robot for robot in robots or examples()]
+    given = [_load_stdin(robot, how) if with_study else robot for robot in robots or examples()]
     given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
     with (
         stoppable() as stop,
@@ -242,10 +244,10 @@ def command(
         progress(as_json=json_progress) as tell,
     ):
         report = validate(given, executor=executor, progress=tell, **options, **how)
-        if judged and not report.interrupted:
-            settings = StudySettings(judge_samples, options["seed"], judge_moving_base)
+        if with_study and not report.interrupted:
+            settings = StudySettings(accuracy_samples, options["seed"], accuracy_moving_base)
             retries = retry is not None
-            report = judge_all(report, given, settings, store=store, shard=shard, retry=retries, how=how)
+            report = study_all(report, given, settings, store=store, shard=shard, retry=retries, how=how)
     if shard:
         _say_shard(report, shard, store)
         context.exit(stop.exit_code(report.exit_code))

@@ -247,8 +247,8 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
             for check in in_order(robot)
             if title and "second_oracle" in check
         ],
-        "accuracy": pages.accuracy_rows(robot["judge"]) if robot["judge"] else [],
-        "accuracy_words": accuracy_words(robot["judge"]) if robot["judge"] else "",
+        "accuracy": pages.accuracy_rows(robot["accuracy"]) if robot["accuracy"] else [],
+        "accuracy_words": accuracy_words(robot["accuracy"]) if robot["accuracy"] else "",
         "many": installed(),
         "heat_heads": heads,
         "heat": heat,

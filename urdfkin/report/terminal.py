@@ -175,13 +175,13 @@ def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
     reading = robot.get("second_reader")
     if cases and reading is not None and (reading["known"] or reading["unread"]):
         out.print(f"{robot['source']}: {second_reader_words(robot)}")
-    if robot["judge"] is not None:
+    if robot["accuracy"] is not None:
         out.print(
             f"{robot['source']}: errors in eps*scale, compared with values at 50 digits;"
-            f" {accuracy_words(robot['judge'])}",
+            f" {accuracy_words(robot['accuracy'])}",
             style="bold",
         )
-        print_table(out, _accuracy_table(robot["judge"]))
+        print_table(out, _accuracy_table(robot["accuracy"]))
     for check in robot["checks"]:
         case = check["worst_case"]
         if case is None or not (cases or check["failed"]):

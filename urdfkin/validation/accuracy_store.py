@@ -1,6 +1,6 @@
 """Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
-The file `judge.json` contains the settings. The result of each robot is a file in the folder of the chunks,
+`accuracy.json` contains the settings. The result of each robot is a file in the folder of the chunks,
 with a checksum. The name of the file is the sha256 of all data on which the numbers in the file depend.
 """
 
@@ -37,8 +37,8 @@ class StudySettings:
     @property
     def options(self) -> str:
         """The settings as command-line options."""
-        moving = " --judge-moving-base" if self.moving_base else ""
-        return f"--judge-samples {self.samples} --seed {self.seed}{moving}"
+        moving = " --accuracy-moving-base" if self.moving_base else ""
+        return f"--accuracy-samples {self.samples} --seed {self.seed}{moving}"
 
 
 class AccuracyResult:
@@ -87,7 +87,7 @@ class AccuracyResult:
 
     def keep(self, robot: int, found: AccuracyStudy | FailedStudy) -> None:
         key = self._key(robot)
-        self._store.write_entry(key, STUDY_SUFFIX, pack(key, {"judge": found}))
+        self._store.write_entry(key, STUDY_SUFFIX, pack(key, {"accuracy": found}))
 
     def stamp(self, robot: int) -> str:
         """Return the sha256 of the robot's text, which identifies the text to which a result belongs."""
@@ -107,11 +107,11 @@ class AccuracyResult:
         origin, stamp = manifest.robots[robot]
         origin = replace(origin, oracle=None)  # the study does not use a second oracle
         parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), stamp]
-        return hashlib.sha256(json.dumps([LAYOUT, "judge", *parts], sort_keys=True).encode()).hexdigest()
+        return hashlib.sha256(json.dumps([LAYOUT, "accuracy", *parts], sort_keys=True).encode()).hexdigest()
 
 
 def _decode(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
-    data = unpack(key, content).get("judge")
+    data = unpack(key, content).get("accuracy")
     try:
         if isinstance(data, dict) and "reason" in data:
             return typed(data, FailedStudy)

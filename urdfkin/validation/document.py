@@ -333,7 +333,9 @@ class ReportedRobot(TypedDict):
     checks: Annotated[
         list[ReportedCheck], says("Comparisons with Pinocchio, one for each quantity and reference frame.")
     ]
-    judge: Annotated[ReportedAccuracy | None, says("Result of the accuracy study; null without `--judge`.")]
+    accuracy: Annotated[
+        ReportedAccuracy | None, says("Result of the accuracy study; null without `--accuracy`.")
+    ]
 
 
 class Document(Header):

@@ -133,7 +133,7 @@ class RobotReport:
             "chains": self.summary.chains,
             "second_reader": self.summary.second_reader,
             "checks": [self._check(key) for key in self.tallies],
-            "judge": study,
+            "accuracy": study,
         }
 
     def _check(self, key: Key) -> dict[str, Any]:

@@ -3,8 +3,8 @@
     DIR/manifest.json              definition of the campaign
     DIR/chunks/4f/4f1a....chunk    result of a chunk
     DIR/chunks/4f/4f1a....failed   reason why the robot of a chunk could not be checked
-    DIR/judge.json                 settings of the accuracy study
-    DIR/chunks/4f/4f1a....judged   result of the accuracy study of a robot
+    DIR/accuracy.json              settings of the accuracy study
+    DIR/chunks/4f/4f1a....accuracy result of the accuracy study of a robot
     DIR/lock                       locked by the process that writes to the store
 
 Files are written atomically, so a file is either complete or absent. A damaged file, and a file whose name
@@ -35,10 +35,10 @@ from urdfkin.validation.manifest import Manifest
 _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
-STUDY_FILE = "judge.json"
+STUDY_FILE = "accuracy.json"
 #: Suffix of a file with the accuracy result of a robot.
 #: `urdfkin.validation.accuracy_store` computes the name of the file.
-STUDY_SUFFIX = ".judged"
+STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 
 #: Number of attempts to acquire a lock; the attempts are 0.1 s apart.

@@ -41,18 +41,18 @@ class MismatchError(Exception):
     """Error if two computations of the same number return different results."""
 
 
-def judge(case: Case) -> Outcome:
+def evaluate(case: Case) -> Outcome:
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
-            return _judge_mjcf(case, warned) if is_mjcf(case.data) else _judge(case, warned)
+            return _evaluate_mjcf(case, warned) if is_mjcf(case.data) else _evaluate(case, warned)
     except UrdfkinError as error:
         return Outcome(f"raises {type(error).__name__}", traceback.format_exc())
     except Exception as error:
         return Outcome(f"traceback: {type(error).__name__}", traceback.format_exc())
 
 
-def _judge(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
+def _evaluate(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
     how: dict[str, Any] = {"root_joint": case.root_joint, "mimic": case.mimic}
     findings = urdfkin.check(case.data, **how)
     errors = [finding for finding in findings if finding.severity is Severity.ERROR]
@@ -67,7 +67,7 @@ def _judge(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
     return _computed(robot, findings, warned)
 
 
-def _judge_mjcf(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
+def _evaluate_mjcf(case: Case, warned: list[warnings.WarningMessage]) -> Outcome:
     model = mjcf.compiled(case.data)
     try:
         robot = urdfkin.load(case.data, mimic=case.mimic)
