@@ -140,7 +140,7 @@ def test_from_one_reference_to_the_other_the_axes_and_the_point_move_too(name: s
 def test_a_base_moves_the_hessian_as_it_moves_the_jacobian() -> None:
     robot = urdfkin.load("panda")
     q = robot.sample(4)
-    T = pose([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]], [1.0, 2.0, 3.0])
+    T = pose([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [1.0, 2.0, 3.0])
     on_base = robot.hessian(q, "panda_hand", base=BaseMotion(T, np.ones(6), np.ones(6)))
     here = robot.hessian(q, "panda_hand").reshape(4, 2, 3, robot.nv, robot.nv)
     np.testing.assert_allclose(

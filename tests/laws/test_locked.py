@@ -124,7 +124,8 @@ def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: str) -> None:
 @pytest.mark.parametrize("name", ["panda", "a1"])
 def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> None:
     locked = robot_of(name).locked(joints=lockable(robot_of(name))[:2], lock="ready")
-    base = urdfkin.BaseMotion(pose(p=[1.0, 2.0, 3.0]), [1.0, 0, 0, 0, 0, 2.0], [0, 1.0, 0, 3.0, 0, 0])
+    rates = np.array([[1.0, 0, 0, 0, 0, 2.0], [0, 1.0, 0, 3.0, 0, 0]])
+    base = urdfkin.BaseMotion(pose(p=[1.0, 2.0, 3.0]), *rates)
     q, v, a = state(locked, 2, 4)
     locked.acceleration(q, v, a, locked.link_frames, base=base, verify=True)
     assert locked.certificate().verified
