@@ -56,9 +56,7 @@ ONE_BIT = float(np.nextafter(3.0, 4.0))
     ("q", "wrong"),
     [(1e8, (ONE_BIT, 0)), (1e12, (ONE_BIT, 0)), (1e8, (3, 1e-7)), (1e12, (3, 1e-3)), (1e15, (3, 0.5))],
 )
-def test_a_multiplier_one_bit_off_or_an_offset_that_slipped_is_caught_when_the_joint_has_turned_far(
-    q: float, wrong: tuple[float, float]
-) -> None:
+def test_a_wrong_multiplier_or_offset_is_caught_at_large_angles(q: float, wrong: tuple[float, float]) -> None:
     right, robot = text((3, 0)), misread(text((3, 0)), text(wrong))
     with pytest.raises(urdfkin.VerificationError):
         robot.placement([q], "l2")
@@ -70,7 +68,7 @@ def test_a_multiplier_one_bit_off_or_an_offset_that_slipped_is_caught_when_the_j
 
 @pytest.mark.slow
 @pytest.mark.parametrize("far", FAR)
-def test_chains_of_followers_are_verified_however_far_they_have_turned(far: float) -> None:
+def test_chains_of_mimic_joints_are_verified_at_any_angle(far: float) -> None:
     rng = np.random.default_rng(int(np.log10(far)))
     for _ in range(5):
         robot = urdfkin.load(text(*rng.normal(size=(4, 2)).tolist()))
@@ -119,7 +117,7 @@ numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
 @pytest.mark.slow
 @settings(max_examples=60)
 @given(data=st.data(), n=st.integers(1, 5))
-def test_chains_of_followers_end_at_the_same_joint_with_the_same_rule(data: st.DataObject, n: int) -> None:
+def test_chains_of_mimic_joints_are_resolved_to_the_same_joint_and_rule(data: st.DataObject, n: int) -> None:
     rules = [(data.draw(st.integers(0, i)), data.draw(numbers), data.draw(numbers)) for i in range(n)]
     text = followers(rules)
     theirs = rules_of_text(text, {f"j{i}" for i in range(n + 1)})
@@ -158,7 +156,7 @@ def test_a_rule_that_urdfkin_misreads_is_not_verified(what: str) -> None:
             compute([0.7], "l4")
 
 
-def test_a_reader_that_loses_every_rule_is_not_verified() -> None:
+def test_a_parser_that_loses_all_mimic_rules_is_not_verified() -> None:
     # Only the user's own mimic=False frees the followers: a tree without any says nothing.
     robot = Robot(tree_of(TEXT.encode(), mimic=False), TEXT, origin=Origin("<text>"))
     with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds other coordinates"):
@@ -207,9 +205,7 @@ MIRRORED = ("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
 @pytest.mark.parametrize("multiplier", [5.0, -5.0, 1e-3, 1.0 / 3.0, 7e3])
 @pytest.mark.parametrize("offset", [0.0, 0.7, -1.0, 900.0])
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "continuous"])
-def test_a_leader_stays_where_its_follower_keeps_its_limits(
-    kind: str, offset: float, multiplier: float
-) -> None:
+def test_samples_keep_mimic_joints_within_their_limits(kind: str, offset: float, multiplier: float) -> None:
     middle = 0.3 * multiplier + offset  # where the follower stands with its leader at 0.3
     robot = gripper(kind, (-1.0, 1.0), (multiplier, offset, middle - 0.2, middle + 0.9))
     drawn = robot.sample(2000)
@@ -218,7 +214,7 @@ def test_a_leader_stays_where_its_follower_keeps_its_limits(
     assert reached >= 0.4 * min(1.1 / abs(multiplier), 2.0), "the range that is left is used"
 
 
-def test_a_validation_covers_the_files_limits_and_a_continuous_leader_any_angle() -> None:
+def test_a_validation_covers_the_whole_range_of_a_mimicked_joint() -> None:
     robot = gripper(*MIRRORED)
     drawn = draw(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
     assert drawn[1:3].tolist() == [[-0.005], [0.055]]
@@ -229,7 +225,7 @@ def test_a_validation_covers_the_files_limits_and_a_continuous_leader_any_angle(
 
 
 @pytest.mark.slow
-def test_info_the_data_and_the_report_say_what_mimic_joints_leave_of_a_range() -> None:
+def test_info_data_and_report_state_the_narrowed_range_of_a_mimicked_joint() -> None:
     robot = gripper(*MIRRORED)
     own = "joint leader ranges over -0.005 to 0.055 m"
     allowed = "its mimic joints are within their limits only for values from -0.005 to 0.005 (f1)"
@@ -252,7 +248,7 @@ def test_info_the_data_and_the_report_say_what_mimic_joints_leave_of_a_range() -
     st.floats(-3.0, 3.0), st.floats(1e-3, 3.0),
     st.lists(st.tuples(st.floats(-9.0, 9.0), st.floats(-2.0, 2.0), st.floats(0.01, 1.0)), max_size=3),
 )  # fmt: skip
-def test_any_followers_keep_their_limits_where_there_is_room(
+def test_random_mimic_rules_are_kept_within_limits_if_possible(
     lower: float, width: float, rules: list[tuple[float, float, float]]
 ) -> None:
     middle = lower + 0.5 * width
@@ -266,7 +262,7 @@ def test_any_followers_keep_their_limits_where_there_is_room(
     [(1.0, 0.0, 3.0, 4.0), (-1.0, 0.0, 1.0, 4.0), (0.0, 5.0, -1.0, 1.0)],
     ids=["no common place", "one common point", "a constant outside"],
 )
-def test_where_there_is_no_room_the_leader_keeps_its_own_limits_and_the_follower_is_named(
+def test_a_mimic_joint_that_is_always_outside_its_limits_is_reported(
     rule: tuple[float, float, float, float],
 ) -> None:
     robot = gripper("revolute", (-1.0, 1.0), rule)
@@ -284,6 +280,6 @@ DIGESTS = {
 
 
 @pytest.mark.parametrize("name", DIGESTS)
-def test_a_seed_gives_the_numbers_it_gave_before_where_followers_cut_nothing(name: str) -> None:
+def test_a_seed_gives_the_same_samples_as_in_earlier_versions(name: str) -> None:
     drawn = urdfkin.load(name).sample(20, seed=3)
     assert hashlib.sha256(drawn.tobytes()).hexdigest()[:16] == DIGESTS[name]

@@ -273,7 +273,7 @@ def test_a_locked_robot_is_the_same_as_its_text_with_fixed_joints() -> None:
     assert not urdfkin.same(locked, whole.locked({"wrist_1_joint": 0.6, "shoulder_pan_joint": -1.0}))
 
 
-def test_every_other_result_works_on_a_locked_robot() -> None:
+def test_all_other_results_exist_for_a_locked_robot() -> None:
     panda = urdfkin.load("panda").locked({"panda_finger_joint1": 0.04, "panda_joint3": 0.3})
     frame, q = "panda_hand_tcp", panda.poses["ready"]
     T = panda.placement(q, frame)
@@ -356,7 +356,7 @@ def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() ->
         ({"joints": ["panda_finger_joint2"]}, "it mimics panda_finger_joint1"),
     ],
 )
-def test_a_lock_or_joints_that_make_no_sense_are_one_clear_error(options: dict[str, Any], words: str) -> None:
+def test_an_invalid_lock_raises_an_error(options: dict[str, Any], words: str) -> None:
     for lock in (lambda: urdfkin.load("panda", **options), lambda: urdfkin.load("panda").locked(**options)):
         with pytest.raises(urdfkin.UrdfkinError, match=re.escape(words)):
             lock()

@@ -148,7 +148,9 @@ def test_the_columns_of_the_rate_matrix_are_perpendicular_and_half_long(k: Float
 
 @pytest.mark.slow
 @given(axes, angles, vectors3)
-def test_the_body_sees_the_fixed_frames_rates_turned(k: FloatArray, phi: float, w: FloatArray) -> None:
+def test_body_rates_are_the_rotated_rates_of_the_fixed_frame(
+    k: FloatArray, phi: float, w: FloatArray
+) -> None:
     R = rotation_about(k, phi)
     quat = quaternion_of(R)
     assert np.abs(quaternion_rates(quat, w) - quaternion_rates(quat, R.T @ w, "body")).max() <= ROUNDING

@@ -70,7 +70,7 @@ def test_log_is_pinocchios_log3_away_from_half_a_turn(axis: FloatArray) -> None:
         assert np.abs(log_rotation(R) - pin.log3(R)).max() <= 4 * ROUNDING
 
 
-def test_axis_and_angle_come_back() -> None:
+def test_axis_and_angle_of_a_rotation_are_recovered() -> None:
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
     for angle in (1e-12, 0.5, 3.0, np.pi - 1e-9):
         found, size = axis_angle_of(rotation_about(axis, angle))
@@ -78,7 +78,7 @@ def test_axis_and_angle_come_back() -> None:
         assert np.abs((found - axis) * angle).max() <= ROUNDING
 
 
-def test_no_rotation_has_the_axis_z_and_no_angle() -> None:
+def test_the_identity_has_axis_z_and_angle_zero() -> None:
     axis, angle = axis_angle_of(np.eye(3))
     assert axis.tolist() == [0.0, 0.0, 1.0]
     assert float(angle) == 0.0
@@ -143,7 +143,7 @@ def test_angles_of_a_rotation_give_it_back_at_the_singularity_too(
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
-def test_angles_inside_the_range_come_back_themselves(name: str) -> None:
+def test_angles_within_the_range_are_recovered(name: str) -> None:
     middle = 1.1 if name[0] == name[2] else -0.7
     assert (
         np.abs(euler_of(name, rotation_from_euler(name, [0.3, middle, -2.0])) - [0.3, middle, -2.0]).max()
@@ -254,7 +254,7 @@ REFUSED: dict[str, tuple[Any, Any, str]] = {
 
 
 @pytest.mark.parametrize("given", REFUSED)
-def test_what_describes_no_rotation_is_refused(given: str) -> None:
+def test_an_invalid_rotation_is_refused(given: str) -> None:
     function, arguments, message = REFUSED[given]
     kind = UnknownNameError if given == "an unknown sequence" else InputError
     with pytest.raises(kind, match=message):
