@@ -1,4 +1,4 @@
-"""The whole analytical Jacobian is checked, C^-1 too: no mutant of what makes it ends verified and wrong."""
+"""Verification covers the whole analytical Jacobian, with C^-1: it catches each mutant of the code."""
 
 import ast
 import importlib
@@ -39,7 +39,7 @@ def free() -> Robot:
     return urdfkin.load(FREE, root_joint="floating")
 
 
-# -- what the certificate says -----------------------------------------------------------------------
+# -- certificate -----------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -151,7 +151,7 @@ def test_half_turns_whose_quaternion_has_either_sign_are_verified(free: Robot) -
     free.analytical_jacobian(np.hstack((axis, quat)), "body", "quaternion")
 
 
-# -- the second opinion is right and another's -------------------------------------------------------
+# -- the line of nodes -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", SEQUENCES)

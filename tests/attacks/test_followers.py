@@ -1,4 +1,4 @@
-"""Mimic joints: rules are read twice, angles are the same doubles on both sides, samples keep limits."""
+"""Mimic joints: two parsers agree, the oracle has the same angles, and samples are within limits."""
 
 import hashlib
 import json
@@ -36,10 +36,10 @@ FAR = (1.0, 1e4, 1e8, 1e12, 1e15)
 
 def text(*rules: tuple[object, object]) -> str:
     """A chain of continuous joints: j0 leads, each further one follows the one before by its rule."""
-    return followers([(i, *rule) for i, rule in enumerate(rules)], 'xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"')
+    return mimic_chain([(i, *rule) for i, rule in enumerate(rules)], 'xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"')
 
 
-def followers(rules: Iterable[tuple[int, object, object]], origin: str = 'xyz="0.1 0.2 0.3"') -> str:
+def mimic_chain(rules: Iterable[tuple[int, object, object]], origin: str = 'xyz="0.1 0.2 0.3"') -> str:
     """Joint j0 moves; joint j(i+1) follows the joint of rule i's number, by its multiplier and offset."""
     return chain(["", *(mimic(f"j{leader}", *rule) for leader, *rule in rules)], origin=origin)
 
@@ -109,7 +109,7 @@ def test_sine_and_cosine_are_right_to_the_last_digit_for_angles_of_any_size(expo
     assert robot.certificate().verified
 
 
-# -- rules that are read twice ---------------------------------------------------------------------
+# -- rules from two parsers ------------------------------------------------------------------------
 
 numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
 
@@ -119,7 +119,7 @@ numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
 @given(data=st.data(), n=st.integers(1, 5))
 def test_chains_of_mimic_joints_are_resolved_to_the_same_joint_and_rule(data: st.DataObject, n: int) -> None:
     rules = [(data.draw(st.integers(0, i)), data.draw(numbers), data.draw(numbers)) for i in range(n)]
-    text = followers(rules)
+    text = mimic_chain(rules)
     theirs = rules_of_text(text, {f"j{i}" for i in range(n + 1)})
     ours = {joint.name: joint.mimic for joint in tree_of(text.encode()).joints if joint.mimic}
     assert theirs == ours  # the same doubles
@@ -131,7 +131,7 @@ def test_chains_of_mimic_joints_are_resolved_to_the_same_joint_and_rule(data: st
             assert rule.multiplier * 0.7 + rule.offset == pytest.approx(angles[i], abs=1e-12)
 
 
-TEXT = followers([(0, 1.5, 0.2), (1, -0.5, 0.1), (0, 2.0, 0.0)])
+TEXT = mimic_chain([(0, 1.5, 0.2), (1, -0.5, 0.1), (0, 2.0, 0.0)])
 
 MISREAD = {
     "a multiplier": ("1.5", "1.500000001"),
@@ -157,7 +157,7 @@ def test_a_rule_that_urdfkin_misreads_is_not_verified(what: str) -> None:
 
 
 def test_a_parser_that_loses_all_mimic_rules_is_not_verified() -> None:
-    # Only the user's own mimic=False frees the followers: a tree without any says nothing.
+    # Only mimic=False of the user removes the rules; a tree without rules is not a request.
     robot = Robot(tree_of(TEXT.encode(), mimic=False), TEXT, origin=Origin("<text>"))
     with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds other coordinates"):
         robot.placement(robot.neutral(), "l4")
@@ -190,7 +190,7 @@ def test_joints_in_another_order_and_a_coordinate_of_another_joint_are_found() -
 
 
 def gripper(kind: str, bounds: tuple[float, float], *rules: tuple[float, float, float, float]) -> Robot:
-    """A leader with bounds and followers, each (multiplier, offset, lower, upper)."""
+    """A robot with a mimicked joint; each rule is (multiplier, offset, lower, upper)."""
     joints = [joint("leader", kind, "l0", "l1", more=limit(*bounds))]
     for i, (multiplier, offset, *own) in enumerate(rules, 1):
         more = limit(*own) + mimic("leader", multiplier, offset)
@@ -206,7 +206,7 @@ MIRRORED = ("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
 @pytest.mark.parametrize("offset", [0.0, 0.7, -1.0, 900.0])
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "continuous"])
 def test_samples_keep_mimic_joints_within_their_limits(kind: str, offset: float, multiplier: float) -> None:
-    middle = 0.3 * multiplier + offset  # where the follower stands with its leader at 0.3
+    middle = 0.3 * multiplier + offset  # The value of the mimic joint if the mimicked joint is at 0.3.
     robot = gripper(kind, (-1.0, 1.0), (multiplier, offset, middle - 0.2, middle + 0.9))
     drawn = robot.sample(2000)
     assert robot.limit_violations(drawn) == []
@@ -252,8 +252,8 @@ def test_random_mimic_rules_are_kept_within_limits_if_possible(
     lower: float, width: float, rules: list[tuple[float, float, float]]
 ) -> None:
     middle = lower + 0.5 * width
-    followers = [(m, o, m * middle + o - half, m * middle + o + half) for m, o, half in rules]
-    robot = gripper("prismatic", (lower, lower + width), *followers)
+    mimic_rules = [(m, o, m * middle + o - half, m * middle + o + half) for m, o, half in rules]
+    robot = gripper("prismatic", (lower, lower + width), *mimic_rules)
     assert robot.limit_violations(robot.sample(50)) == []
 
 

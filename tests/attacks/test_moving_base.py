@@ -1,4 +1,4 @@
-"""A base's rotation means one thing, is kept as it was given, and is brought to Pinocchio by another way."""
+"""The rotation of a base is not changed, and Pinocchio receives it from independent code."""
 
 import copy
 import pickle

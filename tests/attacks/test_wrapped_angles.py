@@ -1,4 +1,4 @@
-"""A log that wraps its angles is read as the motion that was logged, and what was done to it is said."""
+"""A log with wrapped angles is read as the logged motion, with a note about each changed joint."""
 
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,8 @@ def arm_of(kind: str, more: str = "") -> Robot:
     return loaded(robot_of(joint("base", kind, "a", "b", 'xyz="1 0 0"', more=more)))
 
 
-def wheel(follower: str = "") -> Robot:
-    return loaded(robot_of(joint("wheel", "continuous", "a", "b", 'xyz="1 0 0"'), follower))
+def wheel(mimic_joint: str = "") -> Robot:
+    return loaded(robot_of(joint("wheel", "continuous", "a", "b", 'xyz="1 0 0"'), mimic_joint))
 
 
 def wrapped(angle: NDArray[Any]) -> NDArray[Any]:
@@ -93,8 +93,8 @@ def test_a_mimic_joint_of_an_unwrapped_joint_is_reported(
     kind: str, ratio: float, told: bool, tmp_path: Path
 ) -> None:
     more = mimic("wheel", ratio) + limit(-6, 6)
-    follower = joint("f", kind, "b", "c", 'xyz="1 0 0"', more=more)
-    motion = read(wheel(follower), tmp_path / "w.csv", wrapped(2.0 * T))
+    mimic_joint = joint("f", kind, "b", "c", 'xyz="1 0 0"', more=more)
+    motion = read(wheel(mimic_joint), tmp_path / "w.csv", wrapped(2.0 * T))
     assert any("joint f follows wheel" in note for note in motion.notes) is told
     np.testing.assert_allclose(motion.q[:, 0], 2.0 * T, atol=1e-12)
 

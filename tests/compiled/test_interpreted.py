@@ -1,4 +1,4 @@
-"""A few configurations are computed by Python's numbers, without Numba, and have the bits of the kernels."""
+"""Without Numba, Python numbers give a few configurations the same bits as the kernels."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_one_result_needs_no_cache(tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
 
 
-# -- when a kernel pays ----------------------------------------------------------------------------------
+# -- choice between kernels and Python -------------------------------------------------------------
 
 
 @pytest.fixture

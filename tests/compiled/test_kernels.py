@@ -1,4 +1,4 @@
-"""Kernels: batches, the parts of an acceleration and the rate of the Jacobian."""
+"""Kernels for batches, and the breakdown of an acceleration."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -80,7 +80,7 @@ def test_an_error_in_the_rows_of_any_thread_is_reported() -> None:
             np.testing.assert_array_equal(out[:, 0], q[:, 0])
 
 
-# -- the parts of an acceleration: each is what it says, and together they are the whole ---------------------
+# -- breakdown of an acceleration ------------------------------------------------------------------
 
 
 ROOM = 64 * np.finfo(np.float64).eps * 30.0
@@ -139,4 +139,4 @@ def test_a_batch_may_be_empty(odd: KinematicTree) -> None:
     assert acceleration_breakdown(odd, 5, q[:0], v[:0], a[:0]).total.shape == (0, 6)
 
 
-# -- the rate of the Jacobian: a derivative, a part of the acceleration, in three references -----------------
+# -- rate of the Jacobian --------------------------------------------------------------------------

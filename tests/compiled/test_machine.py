@@ -1,4 +1,4 @@
-"""Below the kernels: compiling, memory, and sine and cosine."""
+"""Compilation, memory access, and sine and cosine of the kernels."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def test_an_unpickled_plan_has_its_own_addresses() -> None:
     assert not any(x.flags.writeable for x in (again.steps, again.geometry, again.leaders))
 
 
-# -- sine and cosine of the walk, against fifty digits -------------------------------------------------------
+# -- sine and cosine, compared at fifty digits -----------------------------------------------------
 
 
 ONE_JOINT = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">

@@ -1,4 +1,4 @@
-"""The equations on lengths bound the same equations on vectors, and nothing but zero vanishes."""
+"""The equations for lengths bound the equations for vectors; only zero has the length zero."""
 
 import inspect
 from types import FunctionType

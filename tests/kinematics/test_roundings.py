@@ -1,4 +1,4 @@
-"""The counts that bounds are made of, found by the equations on numbers that remember their roundings."""
+"""The counts of roundings in the bounds, measured with numbers that record their roundings."""
 
 import ast
 import itertools

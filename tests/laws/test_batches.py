@@ -1,4 +1,4 @@
-"""A configuration has the same result, to the last bit, alone, prepared, and as any row of a batch."""
+"""A configuration has the same bits alone, in a prepared frame, and in any row of a batch."""
 
 import math
 import tracemalloc
@@ -314,7 +314,7 @@ def test_the_error_of_an_overflow_in_a_breakdown_names_the_samples() -> None:
         robot.acceleration_breakdown(q, v, a, "tool0", threads=2)
 
 
-# -- a configuration has the same result, to the last bit, alone, prepared, and as any row of a batch --------
+# -- bits of single configurations and of batches --------------------------------------------------
 
 #: Rows of a block, of the next, and of one that was filled up.
 SAMPLES = 2 * LANES + 3

@@ -1,4 +1,4 @@
-"""The Hessian is the derivative of the Jacobian by each rate: at fifty digits, summed, by its symmetries."""
+"""The Hessian is the derivative of the Jacobian with respect to each joint, checked at fifty digits."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_an_error_of_1e_12_in_the_hessian_is_found(monkeypatch: pytest.MonkeyPat
         robot.hessian(robot.sample(20), "panda_hand")
 
 
-# -- what Pinocchio 4.1 does, which the oracle puts right: when one of these fails, that can go ------------
+# -- behaviour of Pinocchio 4.1 that the oracle corrects; if a test fails, remove the correction ---
 
 
 def pinocchios(model: Any, q: FloatArray, reference: Any) -> tuple[FloatArray, FloatArray]:

@@ -1,4 +1,4 @@
-"""Identities that hold for any robot, whatever Pinocchio says."""
+"""Identities that hold for any robot, checked without Pinocchio."""
 
 from __future__ import annotations
 
@@ -155,9 +155,9 @@ def test_a_moving_base_is_the_same_robot_on_a_floating_root_joint(name: str) -> 
 @pytest.mark.parametrize("name", ["panda", "mimic_hand_40_sliding", "followers_of_followers", "tree_8"])
 def test_the_jacobian_of_coupled_joints_is_that_of_free_ones_times_g(name: str) -> None:
     coupled, free = robot_of(name), robot_of(name, mimic=False)
-    followers = [joint for joint in coupled.tree.joints if joint.mimic]
-    assert followers
-    assert free.nv == coupled.nv + len(followers)
+    mimic_joints = [joint for joint in coupled.tree.joints if joint.mimic]
+    assert mimic_joints
+    assert free.nv == coupled.nv + len(mimic_joints)
     q, v, a = state(coupled, 7, 10)
     G, q_free = np.zeros((free.nv, coupled.nv)), np.zeros((7, free.nq))
     for i, joint in enumerate(coupled.tree.joints):
@@ -222,7 +222,7 @@ def test_the_jacobian_and_its_rate_make_the_acceleration(name: str) -> None:
         assert (np.abs(total - expected) <= allowed).all(), reference
 
 
-# -- the Jacobian and the acceleration are derivatives of the placement: a study of the step size ------------
+# -- difference quotients for several step sizes ---------------------------------------------------
 
 STEPS = 2.0 ** -np.arange(3.0, 26.0)
 
@@ -283,9 +283,9 @@ def test_a_jacobian_that_is_slightly_wrong_does_not_pass(monkeypatch: pytest.Mon
         assert_converges(linear + 1e-7, reach, 1)
 
 
-# -- a placement in another frame: how such placements compose, and how they are held ------------------------
+# -- relative placements ---------------------------------------------------------------------------
 
-#: Frames of one branch and of two, up the tree, down and across; a base that moves by itself, a follower.
+#: Pairs of frames on one branch and on two, in both directions; also with a mimic joint.
 TRIPLES = {
     "panda": (
         ("panda_link4", "panda_hand", "panda_leftfinger"),

@@ -1,4 +1,4 @@
-"""An accelerometer feels all but gravity, a gyroscope turns with what it sits on: by laws, and by MuJoCo."""
+"""An IMU measures acceleration minus gravity, and angular velocity: by laws, and by MuJoCo."""
 
 from __future__ import annotations
 

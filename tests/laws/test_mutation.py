@@ -1,4 +1,4 @@
-"""The bound is tight: an equation's term that is off by 1e-10 is caught, and so is the URDF's 12th digit."""
+"""The bounds are tight: they catch an error of 1e-10 in a term and a wrong 12th digit of a URDF."""
 
 import ast
 import inspect

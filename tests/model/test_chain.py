@@ -1,4 +1,4 @@
-"""A chain is the same motion as the tree's, whichever way the path runs."""
+"""A chain has the same motion as the tree, for a path in any direction."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def test_an_origin_or_a_direction_off_by_itself_is_a_disagreement(
     assert said in str(error.value)
 
 
-# -- a path's frames and columns, from products of matrices and difference quotients -------------------------
+# -- frames and columns of a path ------------------------------------------------------------------
 
 
 A = pose(exp_rotation([0.3, -0.4, 0.5]), [0.1, 0.2, 0.3])

@@ -1,4 +1,4 @@
-"""Values that look like degrees: one rule, wherever q enters."""
+"""Each function and command warns of values that look like degrees by the same rule."""
 
 import math
 import warnings

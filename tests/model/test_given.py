@@ -1,4 +1,4 @@
-"""q, v and a as people give them: each way of writing means the same numbers, or is refused."""
+"""q, v and a as text, mappings and tables: each notation gives the same numbers or an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tree keeps Pinocchio's order; poses, steps and configurations of its joints."""
+"""The order of a tree, distances of poses, integration, limits, and Pinocchio's layout."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_a_chain_of_50000_links_needs_no_recursion() -> None:
     assert len(tree.path(50_000)) == 50_000
 
 
-# -- how far two poses are apart: the angle and the way, about every axis ------------------------------------
+# -- distance of two poses -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
@@ -119,11 +119,11 @@ def test_the_distance_of_poses_is_the_angle_and_the_displacement(axis: str, angl
     assert np.allclose(apart(T, T), 0.0, atol=1e-15)
 
 
-# -- `integrate` and `difference`: Pinocchio's, and each undoes the other ------------------------------------
+# -- `integrate` and `difference` -------------------------------------------------------------------
 
 
 EPS = np.finfo(float).eps
-#: A robot without followers for each kind of joint: continuous ones, and what it hangs from.
+#: A robot without mimic joints for each kind of root joint.
 SUBJECTS = [("kinova", None), ("a1", "floating"), ("a1", "planar")]
 
 
@@ -198,7 +198,7 @@ def test_integrate_counts_turns_and_difference_takes_the_shortest_way() -> None:
     assert robot.difference("neutral", turned)[wheel] == pytest.approx(np.radians(-10.0))
 
 
-# -- which values of a joint are outside its bounds, and what Pinocchio's layout may hold --------------------
+# -- limits, and the layout of Pinocchio -----------------------------------------------------------
 
 
 LOWER, UPPER = -0.7, 1.3

@@ -43,7 +43,7 @@ def test_a_batch_of_rows_adds_up_row_by_row_and_no_frame_gives_nothing() -> None
     assert add_angular_velocities(np.zeros((0, 3, 3)), np.zeros((0, 3))).tolist() == [0.0, 0.0, 0.0]
 
 
-# -- euler rates against derivatives at 60 digits, and their singularity, said and measured ------------------
+# -- Euler rates and their singularity -------------------------------------------------------------
 
 
 ANGLES, RATES = np.array([0.4, 1.3, -2.1]), np.array([0.7, -1.1, 2.3])
@@ -126,7 +126,7 @@ def test_the_distance_is_zero_where_and_only_where_the_determinant_is(middle: fl
         assert abs(float(np.sin(singularity_distance(name, turns))) - determinant) <= ROUNDING
 
 
-# -- quaternion rates both ways and in both frames, and orientation integrated from them ---------------------
+# -- quaternion rates ------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

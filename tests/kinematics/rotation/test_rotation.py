@@ -1,4 +1,4 @@
-"""Rotations: SciPy and Pinocchio agree, and each description comes back."""
+"""Rotations agree with SciPy and Pinocchio, and each representation is recovered."""
 
 from typing import Any
 
@@ -108,7 +108,7 @@ def test_coordinate_axes_are_aligned_without_rounding() -> None:
     assert np.array_equal(axis_aligning([0.0, 0.0, 1.0]), np.eye(3))
 
 
-# -- three angles and a rotation, there and back, in all 24 sequences ----------------------------------------
+# -- rotations and angles in all 24 sequences ------------------------------------------------------
 
 
 three_angles = st.tuples(angles, angles, angles)
@@ -176,7 +176,7 @@ def test_batches_are_their_members() -> None:
     assert euler_of("zyx", np.zeros((0, 3, 3))).shape == (0, 3)
 
 
-# -- quaternions are SciPy's, scalar last, and multiply like rotations ---------------------------------------
+# -- quaternions -----------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -205,7 +205,7 @@ def test_the_conjugate_is_the_inverse(axis: FloatArray, angle: float) -> None:
     assert np.abs(multiply(quat, conjugate(quat)) - [0, 0, 0, 1]).max() <= ROUNDING
 
 
-# -- the skew matrix is the cross product, and gives its vector back -----------------------------------------
+# -- skew matrices ---------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

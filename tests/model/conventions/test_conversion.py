@@ -1,4 +1,4 @@
-"""Conversions of q, v, a, Jacobians and their derivatives: laws, files of a user, errors, maps of `same`."""
+"""Conversions of q, v, a and Jacobians between conventions: laws, user files, errors, maps of `same`."""
 
 from __future__ import annotations
 
