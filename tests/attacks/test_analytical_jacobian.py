@@ -1,4 +1,4 @@
-"""The whole analytical Jacobian is checked, C^-1 too: no mutant of what makes it ends verified and wrong."""
+"""Verification covers the whole analytical Jacobian, with C^-1: it catches each mutant of the code."""
 
 import ast
 import importlib
@@ -39,13 +39,13 @@ def free() -> Robot:
     return urdfkin.load(FREE, root_joint="floating")
 
 
-# -- what the certificate says -----------------------------------------------------------------------
+# -- certificate -----------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [-1.0, 1.0 + 1e-10, 1.0 + 1e-12])
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
-def test_a_slip_of_the_rate_matrix_is_caught(
+def test_an_error_in_the_rate_matrix_is_caught(
     ur5: Robot, representation: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = module.representation_inverse
@@ -55,7 +55,7 @@ def test_a_slip_of_the_rate_matrix_is_caught(
 
 
 @pytest.mark.slow
-def test_it_has_a_line_of_its_own_in_the_certificate() -> None:
+def test_the_analytical_jacobian_has_its_own_line_in_the_certificate() -> None:
     robot = urdfkin.load("ur5")
     robot.analytical_jacobian(robot.sample(7), "tool0", "xyz")
     (line,) = robot.certificate().lines
@@ -68,7 +68,9 @@ def test_it_has_a_line_of_its_own_in_the_certificate() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True])
-def test_its_replay_line_calls_itself(moving: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_line_that_reproduces_an_error_calls_analytical_jacobian(
+    moving: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     robot = urdfkin.load("ur5")
     q, right = robot.sample(3, 1), module.representation_inverse
     base = BaseMotion(np.array([[0, -1, 0, 3], [1, 0, 0, 2], [0, 0, 1, 1], [0, 0, 0, 1]])) if moving else None
@@ -89,7 +91,7 @@ def test_its_replay_line_calls_itself(moving: bool, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.slow
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
-def test_it_is_verified_in_every_representation(representation: str) -> None:
+def test_the_analytical_jacobian_is_verified_in_each_representation(representation: str) -> None:
     for name in ("ur5", "panda"):
         robot = urdfkin.load(name)
         q = robot.sample(200, 11)
@@ -102,7 +104,9 @@ def test_it_is_verified_in_every_representation(representation: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEQUENCES)
-def test_near_the_singularity_it_is_verified_and_the_bound_grows(free: Robot, name: str) -> None:
+def test_near_the_singularity_the_analytical_jacobian_is_verified_and_the_bound_grows(
+    free: Robot, name: str
+) -> None:
     rng = np.random.default_rng(3)
     turn = 0.0 if name[0].lower() == name[2].lower() else np.pi / 2
     for distance in (1e-1, 1e-3, 1e-5, 1e-7, 1e-8, 2e-9):
@@ -125,7 +129,7 @@ def test_near_the_singularity_it_is_verified_and_the_bound_grows(free: Robot, na
 
 
 @pytest.mark.parametrize("name", ["ZYZ", "xyz"])
-def test_a_slip_far_above_rounding_is_caught_near_the_singularity_too(
+def test_an_error_far_above_rounding_is_caught_near_the_singularity(
     free: Robot, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = module.representation_inverse
@@ -147,11 +151,11 @@ def test_half_turns_whose_quaternion_has_either_sign_are_verified(free: Robot) -
     free.analytical_jacobian(np.hstack((axis, quat)), "body", "quaternion")
 
 
-# -- the second opinion is right and another's -------------------------------------------------------
+# -- the line of nodes -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
-def test_the_line_of_nodes_gives_the_rates_that_differences_give(name: str) -> None:
+def test_rates_from_the_line_of_nodes_equal_difference_quotients(name: str) -> None:
     rng = np.random.default_rng(1)
     low, high = (0.3, 2.8) if name[0].lower() == name[2].lower() else (-1.3, 1.3)
     for _ in range(10):
@@ -167,9 +171,7 @@ def test_the_line_of_nodes_gives_the_rates_that_differences_give(name: str) -> N
         assert abs(apart - abs((np.sin if low > 0 else np.cos)(angles[1]))) < 4 * EPS
 
 
-def test_the_line_of_nodes_shares_nothing_with_what_it_checks_and_a_quaternions_rates_keep_its_length() -> (
-    None
-):
+def test_the_line_of_nodes_is_independent_code_and_quaternion_rates_preserve_the_norm() -> None:
     tree = ast.parse(inspect.getsource(sys.modules[euler_jacobian.__module__]))
     imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     assert imported == {"__future__", "typing", "numpy.typing"}
@@ -227,7 +229,7 @@ def names_called() -> Iterator[set[str]]:
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("name", ["kinematics.bodies", "kinematics.rotation"])
-def test_no_mutant_ends_verified_and_wrong(ur5: Robot, name: str) -> None:
+def test_no_mutant_gives_a_wrong_verified_result(ur5: Robot, name: str) -> None:
     module = importlib.import_module(f"urdfkin.{name}")
     source, q = inspect.getsource(module), ur5.sample(6, 2)
 

@@ -1,4 +1,4 @@
-"""From the smallest numbers to the largest: no false alarm, no result refused that exists, no slip hidden."""
+"""Very small and very large inputs: correct results are returned and verified, others raise RangeError."""
 
 import math
 import shlex
@@ -28,7 +28,7 @@ from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.quantities import VELOCITY
 
-#: A planar, a floating and a sliding joint between turning ones, and two followers.
+#: A robot with joints of each kind and two mimic joints.
 ODD = robot_of(
     joint("a", "planar", "l0", "l1", 'xyz="0.1 0.2 0.3" rpy="0.3 0.4 0.5"'),
     joint("b", "continuous", "l1", "l2", 'xyz="0.3 -0.2 0.1" rpy="0.1 0.2 0.3"', "1 2 3"),
@@ -51,7 +51,7 @@ def numbers(rng: np.random.Generator, exponent: int, size: int) -> FloatArray:
 
 
 def everything(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None) -> int:
-    """Every quantity of the last link in every reference; how many leave the range of doubles."""
+    """Compute each quantity of the last link in each reference; return the number of RangeErrors."""
     beyond = 0
     methods: list[tuple[Any, ...]] = [(x, q) for x in (robot.placement, robot.jacobian, robot.hessian)]
     methods += [(x, q, v) for x in (robot.velocity, robot.jacobian_rate)]
@@ -71,7 +71,7 @@ exponents = st.integers(-323, 300)
 @pytest.mark.long
 @settings(max_examples=150)
 @given(st.tuples(*[exponents] * 6), st.booleans(), st.integers(0, 2**32 - 1))
-def test_numbers_of_any_size_are_verified_or_leave_the_range(
+def test_results_for_inputs_of_any_size_are_verified_or_raise_range_error(
     sizes: tuple[int, ...], moving: bool, seed: int
 ) -> None:
     robot = urdfkin.load(ODD)
@@ -83,16 +83,14 @@ def test_numbers_of_any_size_are_verified_or_leave_the_range(
     base = BaseMotion(*fields) if moving else None
     beyond = everything(robot, q, v, a, base)
     used = sizes if moving else sizes[:3]
-    if max(used) < 75:  # no product of three or four of them overflows
+    if max(used) < 75:  # Then no product of three or four inputs overflows.
         assert beyond == 0
 
 
 @pytest.mark.long
 @settings(max_examples=60)
 @given(st.integers(-323, -140), st.integers(-2, 2), st.integers(0, 2**32 - 1))
-def test_small_rates_beside_coordinates_of_ordinary_size_are_verified(
-    rate: int, length: int, seed: int
-) -> None:
+def test_tiny_velocities_at_ordinary_coordinates_are_verified(rate: int, length: int, seed: int) -> None:
     robot = urdfkin.load(ODD)
     rng = np.random.default_rng(seed)
     q = robot.sample(1, seed % 1000)[0]
@@ -104,7 +102,7 @@ PLANAR = robot_of(joint("f", "planar", "a", "b", 'rpy="0.3 0.4 0.5"'))
 
 
 @pytest.mark.parametrize("size", [1e-323, 1e-310, 1e-200, 1e-170, 1e-154])
-def test_rates_whose_squares_vanish_are_verified_and_their_slips_are_not_excused(size: float) -> None:
+def test_velocities_whose_squares_underflow_are_verified_with_a_small_bound(size: float) -> None:
     robot = urdfkin.load(PLANAR)
     q, v = np.array([[0.0, 0.0, 0.7]]), np.array([[size, 2.0 * size, 0.0]])
     robot.velocity(q[0], v[0], "b")
@@ -117,7 +115,7 @@ def test_rates_whose_squares_vanish_are_verified_and_their_slips_are_not_excused
 
 
 @pytest.mark.parametrize("size", [1e155, 1e160, 1e200, 1e300])
-def test_a_place_whose_square_overflows_is_verified(size: float) -> None:
+def test_a_position_whose_square_overflows_is_verified(size: float) -> None:
     robot = urdfkin.load(PLANAR)
     assert np.isfinite(robot.placement([size, 0.0, 0.7], "b")).all()
     assert np.isfinite(robot.velocity([size, 0.0, 0.7], [size, 1.0, 0.0], "b")).all()
@@ -126,7 +124,7 @@ def test_a_place_whose_square_overflows_is_verified(size: float) -> None:
     assert robot.certificate().verified
 
 
-def test_a_scale_of_zero_means_equal_and_a_product_of_others_is_at_least_the_smallest_number() -> None:
+def test_products_and_magnitudes_are_zero_only_if_a_factor_is_zero() -> None:
     x = np.array([0.0, 1e-200, 1e-200, 5e-324, 1.0, 0.0])
     y = np.array([1e-200, 1e-200, 1e-50, 5e-324, 2.0, 0.0])
     assert product(x, y).tolist() == [0.0, SMALLEST, 1e-200 * 1e-50, SMALLEST, 2.0, 0.0]
@@ -139,7 +137,7 @@ def test_a_scale_of_zero_means_equal_and_a_product_of_others_is_at_least_the_sma
     assert "velocity" in [line.quantity for line in robot.certificate().lines]
 
 
-# -- found by random whole robots (scripts/fuzz.py) ------------------------------------------------
+# -- failures found by scripts/fuzz.py -------------------------------------------------------------
 
 
 def two_axes(first: float, second: float) -> str:
@@ -151,19 +149,19 @@ def two_axes(first: float, second: float) -> str:
 
 @pytest.mark.parametrize(("first", "second"), [(1e155, 0.3), (0.3, -1e200), (1e300, 1e300)])
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_a_table_of_lengths_whose_squares_overflow_is_refused_and_no_error_of_ours(
+def test_dh_raises_range_error_for_lengths_whose_squares_overflow(
     first: float, second: float, convention: str
 ) -> None:
     robot = urdfkin.load(two_axes(first, second))
     with pytest.raises(RangeError, match=r"joint [xy]: .*square of this length"):
         robot.dh("c", "a", convention)
-    if first == 1e155:  # the path is short, but Pinocchio comes from the root
+    if first == 1e155:  # The path is short, but Pinocchio starts at the root.
         with pytest.raises(RangeError, match="joint x"):
             robot.dh("c", "b", convention)
     assert robot.placement(robot.neutral(), "c").shape == (4, 4)
 
 
-def test_tables_and_tree_parameters_of_lengths_up_to_there_are_verified_and_beyond_refused() -> None:
+def test_dh_and_tree_parameters_accept_the_largest_lengths_whose_squares_are_finite() -> None:
     with pytest.raises(RangeError, match="square of this length"):
         urdfkin.load(two_axes(1e160, 0.3)).tree_parameters()
     robot = urdfkin.load(two_axes(1e148, 1e147))
@@ -177,7 +175,7 @@ TINY = robot_of(joint("x", "continuous", "a", "b", 'xyz="1e-195 1e-196 1e-195" r
 
 
 @pytest.mark.filterwarnings("error::urdfkin.NotVerifiedWarning")
-def test_lengths_whose_squares_vanish_do_not_lose_to_rounding_and_the_judges_units_do_not_vanish() -> None:
+def test_lengths_whose_squares_underflow_are_verified_and_judged() -> None:
     robot = urdfkin.load(TINY)
     for convention in ("standard", "modified"):
         robot.dh("b", "a", convention)
@@ -193,10 +191,10 @@ FAINT = robot_of(
 )
 
 
-# -- results that leave the range of doubles -------------------------------------------------------
+# -- results beyond the largest number -------------------------------------------------------------
 
 FRAME = "tool0"
-#: Rates or accelerations of this size give w^2 d, or w x vel, beyond all numbers.
+#: With rates of this size, w^2 d and w x vel overflow.
 HUGE = 1e200
 METHODS: dict[str, Callable[..., object]] = {
     "acceleration": lambda r, q, v, a, **o: r.acceleration(q, v, a, FRAME, **o),
@@ -214,7 +212,9 @@ def ur5() -> Robot:
 
 @pytest.mark.parametrize("verify", [True, False, "sample"])
 @pytest.mark.parametrize("method", METHODS)
-def test_of_a_single_configuration_and_of_a_batch(ur5: Robot, method: str, verify: bool | str) -> None:
+def test_overflow_raises_range_error_for_one_configuration_and_for_a_batch(
+    ur5: Robot, method: str, verify: bool | str
+) -> None:
     q, v = ur5.sample(3 * LANES + 1, 1), np.ones((3 * LANES + 1, 6))
     for row in (0, LANES, 3 * LANES):
         wild = v.copy()
@@ -227,7 +227,7 @@ def test_of_a_single_configuration_and_of_a_batch(ur5: Robot, method: str, verif
 
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
-def test_of_a_prepared_frame_which_then_counts_nothing(reference: str) -> None:
+def test_overflow_in_a_prepared_frame_raises_range_error_and_is_not_counted(reference: str) -> None:
     robot = urdfkin.load("ur5")
     fast, q, v = robot.prepare(FRAME, reference), robot.sample(1)[0], np.ones(6)
     before = fast.acceleration(q, v, v)
@@ -242,7 +242,9 @@ def test_of_a_prepared_frame_which_then_counts_nothing(reference: str) -> None:
 
 @pytest.mark.parametrize("threads", [1, 2, 3, None])
 @pytest.mark.parametrize("row", [0, 2500, 4999])
-def test_in_the_part_of_any_thread(ur5: Robot, threads: int | None, row: int) -> None:
+def test_overflow_in_the_rows_of_any_thread_raises_range_error(
+    ur5: Robot, threads: int | None, row: int
+) -> None:
     q, v = ur5.sample(5000, 1), np.ones((5000, 6))
     v[row] = HUGE
     with pytest.raises(RangeError, match=f"sample {row} of 5000"):
@@ -251,18 +253,18 @@ def test_in_the_part_of_any_thread(ur5: Robot, threads: int | None, row: int) ->
         ur5.jacobian_rate(q, v * 1e108, FRAME, "local", threads=threads, verify=False)
 
 
-def test_on_a_base_that_moves_too_fast(ur5: Robot) -> None:
+def test_overflow_from_the_base_velocity_raises_range_error(ur5: Robot) -> None:
     q, v = ur5.sample(4), np.ones((4, 6))
     for rates in (np.full(6, HUGE), np.where(np.arange(4)[:, np.newaxis] == 2, HUGE, v)):
         with pytest.raises(RangeError):
             ur5.acceleration(q, v, v, FRAME, base=BaseMotion(velocity=rates), verify=False)
 
 
-def test_of_a_robot_that_is_itself_of_that_size() -> None:
+def test_overflow_from_a_huge_link_raises_range_error() -> None:
     far = joint("k", "fixed", "b", "c", 'xyz="1e250 0 0"', "")
     robot = urdfkin.load(robot_of(joint("j", "continuous", "a", "b"), far))
     fast = robot.prepare("c")
-    for rate in (1e30, 1e44):  # of an ordinary robot nobody would look
+    for rate in (1e30, 1e44):  # For a robot of ordinary size, these rates do not overflow.
         with pytest.raises(RangeError):
             fast.acceleration(np.zeros(1), np.array([rate]), np.zeros(1))
         with pytest.raises(RangeError):
@@ -271,8 +273,8 @@ def test_of_a_robot_that_is_itself_of_that_size() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_results_that_exist_are_handed_out_however_large(ur5: Robot, method: str) -> None:
-    # A power of two scales every product exactly: the bits are those of the same motion, slower.
+def test_huge_finite_results_are_returned(ur5: Robot, method: str) -> None:
+    # A power of two scales each product exactly, so the results differ only by this factor.
     factor = 2.0**450
     assert factor > LARGE
     q, v = ur5.sample(5, 2), np.random.default_rng(3).normal(size=(5, 6))
@@ -285,13 +287,13 @@ def test_results_that_exist_are_handed_out_however_large(ur5: Robot, method: str
     METHODS[method](ur5, q, v * factor, v * factor * factor)
 
 
-def test_the_limit_is_where_nothing_can_overflow_below_it() -> None:
-    # N joints of the largest numbers that are not looked at: the bound on w^2 d in the limit's comment.
+def test_nothing_overflows_below_the_limit() -> None:
+    # The bound on w^2 d from the comment of LARGE.
     joints = 10_000
     assert np.isfinite(4.0 * joints**3 * LARGE**6)
 
 
-# -- an acceleration's parts far from the origin ---------------------------------------------------
+# -- breakdown of the acceleration far from the origin ---------------------------------------------
 
 
 def base_at(distance: float, rates: FloatArray) -> BaseMotion:
@@ -302,7 +304,7 @@ def base_at(distance: float, rates: FloatArray) -> BaseMotion:
 @pytest.mark.slow
 @pytest.mark.parametrize("reference", REFERENCES)
 @pytest.mark.parametrize("distance", [0.0, 1e4, 1e5, 1e6, 1e8, 1e12])
-def test_on_a_base_at_map_coordinates_it_is_verified_with_as_small_a_share(
+def test_the_breakdown_on_a_distant_base_uses_a_small_share_of_the_bound(
     distance: float, reference: str
 ) -> None:
     robot, rng = urdfkin.load("panda"), np.random.default_rng(1)
@@ -315,7 +317,7 @@ def test_on_a_base_at_map_coordinates_it_is_verified_with_as_small_a_share(
 
 
 @pytest.mark.parametrize("root_joint", ["floating", "planar"])
-def test_behind_a_root_joint_that_stands_far_away_it_is_verified(root_joint: str) -> None:
+def test_the_breakdown_after_a_distant_root_joint_uses_a_small_share_of_the_bound(root_joint: str) -> None:
     robot = urdfkin.load("panda", root_joint=root_joint)
     rng = np.random.default_rng(2)
     q, (v, a) = robot.sample(60, 1), rng.normal(size=(2, 60, robot.nv))
@@ -326,7 +328,7 @@ def test_behind_a_root_joint_that_stands_far_away_it_is_verified(root_joint: str
 
 
 @pytest.mark.parametrize("reference", ["local", "local_world_aligned"])
-def test_each_part_is_the_one_it_is_at_the_origin(reference: str) -> None:
+def test_the_breakdown_on_a_distant_base_equals_the_breakdown_at_the_origin(reference: str) -> None:
     robot = urdfkin.load("panda")
     rng = np.random.default_rng(3)
     q, (v, a), rates = robot.sample(20, 1), rng.normal(size=(2, 20, robot.nv)), rng.normal(size=12)
@@ -339,8 +341,7 @@ def test_each_part_is_the_one_it_is_at_the_origin(reference: str) -> None:
     assert np.abs(here.base - there.base).max() < 20 * EPS * np.abs(here.base).max()
 
 
-def spoiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Transverse parts that are off by a relative 1e-9."""
+def scale_transverse_terms(monkeypatch: pytest.MonkeyPatch) -> None:
     right = breakdown._terms
 
     def wrong(*x: FloatArray) -> FloatArray:
@@ -351,7 +352,7 @@ def spoiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(breakdown, "_terms", wrong)
 
 
-def disagreement(robot: Robot, base: BaseMotion | None) -> urdfkin.VerificationError:
+def breakdown_error(robot: Robot, base: BaseMotion | None) -> urdfkin.VerificationError:
     rng = np.random.default_rng(4)
     q, (v, a) = robot.sample(3, 1), rng.normal(size=(2, 3, robot.nv))
     with pytest.raises(urdfkin.VerificationError, match="acceleration breakdown") as caught:
@@ -359,19 +360,19 @@ def disagreement(robot: Robot, base: BaseMotion | None) -> urdfkin.VerificationE
     return caught.value
 
 
-def test_the_replay_line_computes_the_parts_on_a_moving_base_and_explains_them_elsewhere(
+def test_the_line_that_reproduces_an_error_in_the_breakdown_runs(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    spoiled(monkeypatch)
+    scale_transverse_terms(monkeypatch)
     base = base_at(1e5, np.arange(12.0))
-    line = disagreement(urdfkin.load("panda"), base).reproduce
+    line = breakdown_error(urdfkin.load("panda"), base).reproduce
     assert ".acceleration_breakdown(" in line
     with pytest.raises(urdfkin.VerificationError):
         eval(line)
     monkeypatch.undo()
     assert isinstance(eval(line), AccelerationBreakdown)
-    spoiled(monkeypatch)
-    words = shlex.split(disagreement(urdfkin.load("panda"), None).reproduce)
+    scale_transverse_terms(monkeypatch)
+    words = shlex.split(breakdown_error(urdfkin.load("panda"), None).reproduce)
     assert words[:3] == ["urdfkin", "acceleration", "--breakdown"]
     assert command(*words[1:]).code == 1
     monkeypatch.undo()

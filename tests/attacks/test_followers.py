@@ -1,4 +1,4 @@
-"""Mimic joints: rules are read twice, angles are the same doubles on both sides, samples keep limits."""
+"""Mimic joints: two parsers agree, the oracle has the same angles, and samples are within limits."""
 
 import hashlib
 import json
@@ -36,10 +36,10 @@ FAR = (1.0, 1e4, 1e8, 1e12, 1e15)
 
 def text(*rules: tuple[object, object]) -> str:
     """A chain of continuous joints: j0 leads, each further one follows the one before by its rule."""
-    return followers([(i, *rule) for i, rule in enumerate(rules)], 'xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"')
+    return mimic_chain([(i, *rule) for i, rule in enumerate(rules)], 'xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"')
 
 
-def followers(rules: Iterable[tuple[int, object, object]], origin: str = 'xyz="0.1 0.2 0.3"') -> str:
+def mimic_chain(rules: Iterable[tuple[int, object, object]], origin: str = 'xyz="0.1 0.2 0.3"') -> str:
     """Joint j0 moves; joint j(i+1) follows the joint of rule i's number, by its multiplier and offset."""
     return chain(["", *(mimic(f"j{leader}", *rule) for leader, *rule in rules)], origin=origin)
 
@@ -56,9 +56,7 @@ ONE_BIT = float(np.nextafter(3.0, 4.0))
     ("q", "wrong"),
     [(1e8, (ONE_BIT, 0)), (1e12, (ONE_BIT, 0)), (1e8, (3, 1e-7)), (1e12, (3, 1e-3)), (1e15, (3, 0.5))],
 )
-def test_a_multiplier_one_bit_off_or_an_offset_that_slipped_is_caught_when_the_joint_has_turned_far(
-    q: float, wrong: tuple[float, float]
-) -> None:
+def test_a_wrong_multiplier_or_offset_is_caught_at_large_angles(q: float, wrong: tuple[float, float]) -> None:
     right, robot = text((3, 0)), misread(text((3, 0)), text(wrong))
     with pytest.raises(urdfkin.VerificationError):
         robot.placement([q], "l2")
@@ -70,7 +68,7 @@ def test_a_multiplier_one_bit_off_or_an_offset_that_slipped_is_caught_when_the_j
 
 @pytest.mark.slow
 @pytest.mark.parametrize("far", FAR)
-def test_chains_of_followers_are_verified_however_far_they_have_turned(far: float) -> None:
+def test_chains_of_mimic_joints_are_verified_at_any_angle(far: float) -> None:
     rng = np.random.default_rng(int(np.log10(far)))
     for _ in range(5):
         robot = urdfkin.load(text(*rng.normal(size=(4, 2)).tolist()))
@@ -111,7 +109,7 @@ def test_sine_and_cosine_are_right_to_the_last_digit_for_angles_of_any_size(expo
     assert robot.certificate().verified
 
 
-# -- rules that are read twice ---------------------------------------------------------------------
+# -- rules from two parsers ------------------------------------------------------------------------
 
 numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
 
@@ -119,9 +117,9 @@ numbers = st.floats(-2.0, 2.0).filter(lambda x: x == 0.0 or abs(x) > 1e-3)
 @pytest.mark.slow
 @settings(max_examples=60)
 @given(data=st.data(), n=st.integers(1, 5))
-def test_chains_of_followers_end_at_the_same_joint_with_the_same_rule(data: st.DataObject, n: int) -> None:
+def test_chains_of_mimic_joints_are_resolved_to_the_same_joint_and_rule(data: st.DataObject, n: int) -> None:
     rules = [(data.draw(st.integers(0, i)), data.draw(numbers), data.draw(numbers)) for i in range(n)]
-    text = followers(rules)
+    text = mimic_chain(rules)
     theirs = rules_of_text(text, {f"j{i}" for i in range(n + 1)})
     ours = {joint.name: joint.mimic for joint in tree_of(text.encode()).joints if joint.mimic}
     assert theirs == ours  # the same doubles
@@ -133,7 +131,7 @@ def test_chains_of_followers_end_at_the_same_joint_with_the_same_rule(data: st.D
             assert rule.multiplier * 0.7 + rule.offset == pytest.approx(angles[i], abs=1e-12)
 
 
-TEXT = followers([(0, 1.5, 0.2), (1, -0.5, 0.1), (0, 2.0, 0.0)])
+TEXT = mimic_chain([(0, 1.5, 0.2), (1, -0.5, 0.1), (0, 2.0, 0.0)])
 
 MISREAD = {
     "a multiplier": ("1.5", "1.500000001"),
@@ -158,8 +156,8 @@ def test_a_rule_that_urdfkin_misreads_is_not_verified(what: str) -> None:
             compute([0.7], "l4")
 
 
-def test_a_reader_that_loses_every_rule_is_not_verified() -> None:
-    # Only the user's own mimic=False frees the followers: a tree without any says nothing.
+def test_a_parser_that_loses_all_mimic_rules_is_not_verified() -> None:
+    # Only mimic=False of the user removes the rules; a tree without rules is not a request.
     robot = Robot(tree_of(TEXT.encode(), mimic=False), TEXT, origin=Origin("<text>"))
     with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds other coordinates"):
         robot.placement(robot.neutral(), "l4")
@@ -192,7 +190,7 @@ def test_joints_in_another_order_and_a_coordinate_of_another_joint_are_found() -
 
 
 def gripper(kind: str, bounds: tuple[float, float], *rules: tuple[float, float, float, float]) -> Robot:
-    """A leader with bounds and followers, each (multiplier, offset, lower, upper)."""
+    """A robot with a mimicked joint; each rule is (multiplier, offset, lower, upper)."""
     joints = [joint("leader", kind, "l0", "l1", more=limit(*bounds))]
     for i, (multiplier, offset, *own) in enumerate(rules, 1):
         more = limit(*own) + mimic("leader", multiplier, offset)
@@ -207,10 +205,8 @@ MIRRORED = ("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
 @pytest.mark.parametrize("multiplier", [5.0, -5.0, 1e-3, 1.0 / 3.0, 7e3])
 @pytest.mark.parametrize("offset", [0.0, 0.7, -1.0, 900.0])
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "continuous"])
-def test_a_leader_stays_where_its_follower_keeps_its_limits(
-    kind: str, offset: float, multiplier: float
-) -> None:
-    middle = 0.3 * multiplier + offset  # where the follower stands with its leader at 0.3
+def test_samples_keep_mimic_joints_within_their_limits(kind: str, offset: float, multiplier: float) -> None:
+    middle = 0.3 * multiplier + offset  # The value of the mimic joint if the mimicked joint is at 0.3.
     robot = gripper(kind, (-1.0, 1.0), (multiplier, offset, middle - 0.2, middle + 0.9))
     drawn = robot.sample(2000)
     assert robot.limit_violations(drawn) == []
@@ -218,7 +214,7 @@ def test_a_leader_stays_where_its_follower_keeps_its_limits(
     assert reached >= 0.4 * min(1.1 / abs(multiplier), 2.0), "the range that is left is used"
 
 
-def test_a_validation_covers_the_files_limits_and_a_continuous_leader_any_angle() -> None:
+def test_a_validation_covers_the_whole_range_of_a_mimicked_joint() -> None:
     robot = gripper(*MIRRORED)
     drawn = draw(robot.tree, 2000, np.random.default_rng(0), with_special=True).q
     assert drawn[1:3].tolist() == [[-0.005], [0.055]]
@@ -229,7 +225,7 @@ def test_a_validation_covers_the_files_limits_and_a_continuous_leader_any_angle(
 
 
 @pytest.mark.slow
-def test_info_the_data_and_the_report_say_what_mimic_joints_leave_of_a_range() -> None:
+def test_info_data_and_report_state_the_narrowed_range_of_a_mimicked_joint() -> None:
     robot = gripper(*MIRRORED)
     own = "joint leader ranges over -0.005 to 0.055 m"
     allowed = "its mimic joints are within their limits only for values from -0.005 to 0.005 (f1)"
@@ -252,12 +248,12 @@ def test_info_the_data_and_the_report_say_what_mimic_joints_leave_of_a_range() -
     st.floats(-3.0, 3.0), st.floats(1e-3, 3.0),
     st.lists(st.tuples(st.floats(-9.0, 9.0), st.floats(-2.0, 2.0), st.floats(0.01, 1.0)), max_size=3),
 )  # fmt: skip
-def test_any_followers_keep_their_limits_where_there_is_room(
+def test_random_mimic_rules_are_kept_within_limits_if_possible(
     lower: float, width: float, rules: list[tuple[float, float, float]]
 ) -> None:
     middle = lower + 0.5 * width
-    followers = [(m, o, m * middle + o - half, m * middle + o + half) for m, o, half in rules]
-    robot = gripper("prismatic", (lower, lower + width), *followers)
+    mimic_rules = [(m, o, m * middle + o - half, m * middle + o + half) for m, o, half in rules]
+    robot = gripper("prismatic", (lower, lower + width), *mimic_rules)
     assert robot.limit_violations(robot.sample(50)) == []
 
 
@@ -266,7 +262,7 @@ def test_any_followers_keep_their_limits_where_there_is_room(
     [(1.0, 0.0, 3.0, 4.0), (-1.0, 0.0, 1.0, 4.0), (0.0, 5.0, -1.0, 1.0)],
     ids=["no common place", "one common point", "a constant outside"],
 )
-def test_where_there_is_no_room_the_leader_keeps_its_own_limits_and_the_follower_is_named(
+def test_a_mimic_joint_that_is_always_outside_its_limits_is_reported(
     rule: tuple[float, float, float, float],
 ) -> None:
     robot = gripper("revolute", (-1.0, 1.0), rule)
@@ -284,6 +280,6 @@ DIGESTS = {
 
 
 @pytest.mark.parametrize("name", DIGESTS)
-def test_a_seed_gives_the_numbers_it_gave_before_where_followers_cut_nothing(name: str) -> None:
+def test_a_seed_gives_the_same_samples_as_in_earlier_versions(name: str) -> None:
     drawn = urdfkin.load(name).sample(20, seed=3)
     assert hashlib.sha256(drawn.tobytes()).hexdigest()[:16] == DIGESTS[name]

@@ -1,4 +1,4 @@
-"""Files kept between runs: damage is mended, a full disc ends nothing, a stranger's files are not run."""
+"""The cache on disc: damaged files are replaced, a full disc is no error, other users' files are not run."""
 
 import errno
 import os
@@ -28,7 +28,7 @@ from urdfkin.system.cache import CacheWarning, cache_folder, get, put
 
 
 @pytest.fixture(autouse=True)
-def _nothing_said_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_warning_yet(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cache, "_warned", set())
 
 
@@ -38,19 +38,19 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-#: A command with so many configurations that it uses a kernel.
+#: A command with enough configurations to use a kernel.
 BATCH = ("placement", "ur5", "--q", "random:20000", "--format", "csv")
 
 
-def third(x: Any) -> Any:
+def third_number(x: Any) -> Any:
     return int(x[2])
 
 
-def fresh() -> Kernel:
-    return Kernel(third, (NUMBERS,), True)
+def new_kernel() -> Kernel:
+    return Kernel(third_number, (NUMBERS,), True)
 
 
-def ask(kernel: Kernel) -> int:
+def call(kernel: Kernel) -> int:
     return kernel(np.array([5.0, 6.0, 7.0]))
 
 
@@ -58,65 +58,64 @@ def was_compiled(kernel: Kernel) -> bool:
     return bool(kernel.compiled.stats.cache_misses)
 
 
-def flipped(content: bytes) -> bytes:
-    """One bit in the middle, which for a kernel is machine code."""
-    middle = len(content) // 2
+def with_one_bit_flipped(content: bytes) -> bytes:
+    middle = len(content) // 2  # In a kernel, the middle is machine code.
     return content[:middle] + bytes([content[middle] ^ 4]) + content[middle + 1 :]
 
 
 DAMAGE: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda content: b"",
     "cut": lambda content: content[: len(content) // 2],
-    "one bit": flipped,
+    "one bit": with_one_bit_flipped,
     "a byte more": lambda content: content + b"\x00",
     "random": lambda content: np.random.default_rng(0).bytes(len(content)),
     "zeros": lambda content: bytes(len(content)),
-    "a pickle that is none of ours": lambda content: pickle.dumps(["something", "else"]),
+    "another pickle": lambda content: pickle.dumps(["something", "else"]),
 }
 
 
-def test_a_kernel_is_compiled_once_and_read_unless_it_is_of_another_time(folder: Path) -> None:
-    assert was_compiled(fresh())
-    again = fresh()
+def test_a_kernel_is_compiled_once_and_compiled_again_if_the_file_is_invalid(folder: Path) -> None:
+    assert was_compiled(new_kernel())
+    again = new_kernel()
     assert not was_compiled(again)
-    assert ask(again) == 7
+    assert call(again) == 7
     (file,) = folder.iterdir()
     put(file, pickle.dumps(("not", "a", "kernel")))
     with pytest.warns(CacheWarning, match="is damaged and is computed again"):
-        assert ask(fresh()) == 7
-    assert not was_compiled(fresh())
+        assert call(new_kernel()) == 7
+    assert not was_compiled(new_kernel())
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("damage", DAMAGE)
-def test_a_damaged_kernel_is_said_compiled_again_and_mended(damage: str, folder: Path) -> None:
-    ask(fresh())
+def test_a_damaged_kernel_is_compiled_again_with_a_warning_and_replaced(damage: str, folder: Path) -> None:
+    call(new_kernel())
     (file,) = folder.iterdir()
     file.write_bytes(DAMAGE[damage](file.read_bytes()))
-    kernel = fresh()
+    kernel = new_kernel()
     with pytest.warns(CacheWarning, match=f"{file.name} is damaged and is computed again"):
-        assert ask(kernel) == 7
+        assert call(kernel) == 7
     assert was_compiled(kernel)
-    assert not was_compiled(fresh())
+    assert not was_compiled(new_kernel())
     assert list(folder.iterdir()) == [file]
 
 
-def test_a_kept_file_in_another_folder_of_its_name_is_noticed(tmp_path: Path) -> None:
+def test_a_cached_file_copied_to_another_folder_is_rejected(tmp_path: Path) -> None:
     first, second = tmp_path / "library-1" / "machine.code", tmp_path / "library-2" / "machine.code"
-    for place in (first, second):
-        place.parent.mkdir()
+    for path in (first, second):
+        path.parent.mkdir()
     put(first, b"of the first")
     second.write_bytes(first.read_bytes())
     with pytest.warns(CacheWarning, match="the checksum of the file does not match its content and its name"):
         assert get(second) is None
     assert get(first) == b"of the first"
-    moved = tmp_path / "elsewhere" / "library-1"  # the cache as a whole
+    moved = tmp_path / "elsewhere" / "library-1"  # The whole cache is moved.
     moved.parent.mkdir()
     first.parent.rename(moved)
     assert get(moved / "machine.code") == b"of the first"
 
 
-# -- no room ---------------------------------------------------------------------------------------------
+# -- no space --------------------------------------------------------------------------------------
 
 
 def failing(code: int) -> Callable[..., NoReturn]:
@@ -127,30 +126,28 @@ def failing(code: int) -> Callable[..., NoReturn]:
 
 
 @pytest.fixture(params=[errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EIO])
-def no_room(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
-    """Every new file fails so; the superuser, as whom tests may run, can be refused no other way."""
+def no_space(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
+    """The error of every new file; file permissions would not stop the superuser."""
     code: int = request.param
     monkeypatch.setattr("urdfkin.system.cache.tempfile.NamedTemporaryFile", failing(code))
     return code
 
 
 @pytest.mark.long
-def test_where_nothing_can_be_written_everything_goes_on_and_it_is_said_once(
-    folder: Path, no_room: int
-) -> None:
-    with warnings.catch_warnings(record=True) as said:
+def test_an_unwritable_cache_causes_one_warning_and_no_error(folder: Path, no_space: int) -> None:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        assert ask(fresh()) == 7
-        assert ask(fresh()) == 7
-    (warning,) = said
+        assert call(new_kernel()) == 7
+        assert call(new_kernel()) == 7
+    (warning,) = caught
     assert warning.category is CacheWarning
-    assert f"the cache cannot be written in {folder}: {os.strerror(no_room)}" in str(warning.message)
+    assert f"the cache cannot be written in {folder}: {os.strerror(no_space)}" in str(warning.message)
     assert list(folder.iterdir()) == []
 
 
 @pytest.fixture
-def largest_file() -> Iterator[Callable[[int], None]]:
-    """Let files grow to so many bytes only: what is written ends in the middle, as on a full disc."""
+def limit_file_size() -> Iterator[Callable[[int], None]]:
+    """A function that limits the size of files, so that a write ends early, as on a full disc."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
@@ -158,10 +155,8 @@ def largest_file() -> Iterator[Callable[[int], None]]:
     signal.signal(signal.SIGXFSZ, handler)
 
 
-def test_a_file_that_ends_in_the_middle_leaves_nothing_behind(
-    tmp_path: Path, largest_file: Callable[[int], None]
-) -> None:
-    largest_file(1000)
+def test_an_incomplete_write_leaves_no_file(tmp_path: Path, limit_file_size: Callable[[int], None]) -> None:
+    limit_file_size(1000)
     with pytest.warns(CacheWarning, match=f"the cache cannot be written in .*: {os.strerror(errno.EFBIG)}"):
         put(tmp_path / "kept", bytes(5000))
     assert list(tmp_path.iterdir()) == []
@@ -170,10 +165,10 @@ def test_a_file_that_ends_in_the_middle_leaves_nothing_behind(
 
 
 @pytest.mark.long
-def test_a_command_on_a_full_disc_gives_its_result_and_says_so(
-    tmp_path: Path, largest_file: Callable[[int], None]
+def test_a_command_on_a_full_disc_prints_its_result_and_one_warning(
+    tmp_path: Path, limit_file_size: Callable[[int], None]
 ) -> None:
-    """A disc of its own where the system lets one be mounted; else files may not grow."""
+    """The cache is a small file system or, if that cannot be mounted, the size of files is limited."""
     cache, disc = tmp_path / "cache", ["mount", "-t", "tmpfs", "-o", "size=64k,mode=0700", "none"]
     cache.mkdir(mode=0o700)
     mounted = subprocess.run([*disc, str(cache)], capture_output=True, check=False).returncode == 0
@@ -181,7 +176,7 @@ def test_a_command_on_a_full_disc_gives_its_result_and_says_so(
         if mounted:
             (cache / "much").write_bytes(bytes(60_000))
         else:
-            largest_file(10_000)  # a process inherits the limit, and that its signal is ignored
+            limit_file_size(10_000)  # A child process inherits the limit and the ignored signal.
         done = process(*BATCH, XDG_CACHE_HOME=str(cache), NUMBA_CACHE_DIR="")
     finally:
         if mounted:
@@ -193,11 +188,11 @@ def test_a_command_on_a_full_disc_gives_its_result_and_says_so(
 
 
 @pytest.mark.long
-def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path: Path) -> None:
+def test_a_command_with_a_damaged_cache_prints_one_warning_and_replaces_the_file(tmp_path: Path) -> None:
     placement = partial(process, *BATCH, XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR="")
     placement()
     kernel = min(tmp_path.glob("urdfkin/kernels-*/[!.]*"))
-    kernel.write_bytes(flipped(kernel.read_bytes()))
+    kernel.write_bytes(with_one_bit_flipped(kernel.read_bytes()))
     done = placement()
     assert done.code == 0
     (line,) = [line for line in done.err.splitlines() if "damaged" in line]
@@ -205,21 +200,21 @@ def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path:
     assert "damaged" not in placement().err
 
 
-# -- whose folder ------------------------------------------------------------------------------------------
+# -- owner of the folder ---------------------------------------------------------------------------
 
 
-def refused(root: Path, words: str) -> None:
+def demand_refused(root: Path, words: str) -> None:
     with pytest.warns(CacheWarning, match=words):
         assert cache_folder("kernels", [], root=root) is None
 
 
-def made(root: Path, *words: str, kind: str = "kernels") -> Path:
+def created(root: Path, *words: str, kind: str = "kernels") -> Path:
     folder = cache_folder(kind, [], *words, root=root)
     assert folder is not None
     return folder
 
 
-def test_a_folder_of_ones_own_is_closed_to_others_and_may_be_of_a_group_of_ones_own(
+def test_a_new_cache_is_private_and_only_a_private_group_may_write_in_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = os.umask(0)
@@ -228,29 +223,29 @@ def test_a_folder_of_ones_own_is_closed_to_others_and_may_be_of_a_group_of_ones_
     finally:
         os.umask(before)
     assert folder is not None
-    assert [stat.S_IMODE(place.stat().st_mode) for place in (folder, folder.parent)] == [0o700, 0o700]
-    folder = made(tmp_path)
+    assert [stat.S_IMODE(path.stat().st_mode) for path in (folder, folder.parent)] == [0o700, 0o700]
+    folder = created(tmp_path)
     folder.chmod(0o770)
     monkeypatch.setattr(cache, "_is_private", lambda group: True)
     assert cache_folder("kernels", [], root=tmp_path) == folder
     monkeypatch.setattr(cache, "_is_private", lambda group: False)
-    refused(tmp_path, "a group can write to")
+    demand_refused(tmp_path, "a group can write to")
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o1777, 0o702])
-def test_a_folder_that_everybody_may_write_in_is_refused(mode: int, tmp_path: Path) -> None:
-    made(tmp_path).chmod(mode)
-    refused(tmp_path, r"every user can write to .*chmod go-w.* and delete")
+def test_a_folder_that_every_user_can_write_to_is_refused(mode: int, tmp_path: Path) -> None:
+    created(tmp_path).chmod(mode)
+    demand_refused(tmp_path, r"every user can write to .*chmod go-w.* and delete")
 
 
-def test_a_folder_in_which_everybody_could_put_another_or_of_a_root_without_writing_is_refused(
+def test_a_parent_folder_that_is_replaceable_or_no_folder_is_refused(
     tmp_path: Path,
 ) -> None:
     shared = tmp_path / "shared"
     shared.mkdir()
     shared.chmod(0o777)
-    refused(shared / "urdfkin", "every user can write to")
-    shared.chmod(0o1777)  # sticky, as /tmp: nobody can move what another owns
+    demand_refused(shared / "urdfkin", "every user can write to")
+    shared.chmod(0o1777)  # Sticky, as /tmp: only the owner can rename a file.
     assert cache_folder("kernels", [], root=shared / "urdfkin") is not None
     (tmp_path / "file").write_text("")
     with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
@@ -261,79 +256,81 @@ def test_a_folder_in_which_everybody_could_put_another_or_of_a_root_without_writ
 def test_a_folder_of_another_user_is_refused(
     whose: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its files would be unpickled, and could do anything. Only the superuser can give folders away."""
+    """Unpickling the files of another user could run any code. Only the superuser can change an owner."""
     root = tmp_path / "shared" / "urdfkin"
-    folder = made(root)
+    folder = created(root)
     stranger = {"the folder": folder, "the one above": root.parent}.get(whose, folder)
     if whose == "the file behind a link":
         (tmp_path / "link").symlink_to(root)
         root = tmp_path / "link"
     own = Path.stat
 
-    def told(self: Path, **options: Any) -> Any:
+    def stat_of_another_user(self: Path, **options: Any) -> Any:
         found = own(self, **options)
         return os.stat_result((*found[:4], 12345, *found[5:])) if self == stranger else found
 
     if os.geteuid() == 0:
         os.chown(stranger, 12345, 12345)
     else:
-        monkeypatch.setattr(Path, "stat", told)
-    refused(root, "belongs to another user; set XDG_CACHE_HOME to a folder of your own")
+        monkeypatch.setattr(Path, "stat", stat_of_another_user)
+    demand_refused(root, "belongs to another user; set XDG_CACHE_HOME to a folder of your own")
 
 
-def test_a_planted_kernel_of_another_user_is_not_unpickled_and_an_old_folder_left_alone(
+def test_a_kernel_of_another_user_is_not_unpickled_and_its_old_folder_is_not_deleted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if os.geteuid() != 0:
-        pytest.skip("only the superuser can give a folder away")
+        pytest.skip("only the superuser can change the owner of a folder")
     monkeypatch.setattr(compiling, "cache_folder", lambda: cache_folder("kernels", [], root=tmp_path))
-    ask(fresh())
+    call(new_kernel())
     (folder,) = tmp_path.iterdir()
     (file,) = (path for path in folder.iterdir() if path.name != ".used")
-    put(file, pickle.dumps(Planted()))
+    put(file, pickle.dumps(Malicious()))
     os.chown(folder, 12345, 12345)
     with pytest.warns(CacheWarning, match="belongs to another user"):
-        assert ask(fresh()) == 7
-    assert not Planted.ran
-    old = made(tmp_path / "others", "old")
+        assert call(new_kernel()) == 7
+    assert not Malicious.ran
+    old = created(tmp_path / "others", "old")
     os.utime(old / ".used", (0.0, 0.0))
     os.chown(old / ".used", 12345, 12345)
-    made(tmp_path / "others", "new")
+    created(tmp_path / "others", "new")
     assert old.exists()
 
 
-class Planted:
+class Malicious:
     ran = False
 
     def __reduce__(self) -> tuple[Callable[[], None], tuple[()]]:
-        return run_planted, ()
+        return run_malicious, ()
 
 
-def run_planted() -> None:
-    Planted.ran = True
+def run_malicious() -> None:
+    Malicious.ran = True
 
 
-def test_a_folder_that_can_only_be_read_is_still_read(
+def test_a_read_only_folder_is_used_without_a_warning(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = made(tmp_path)
+    folder = created(tmp_path)
     monkeypatch.setattr(Path, "touch", failing(errno.EROFS))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert cache_folder("kernels", [], root=tmp_path) == folder
 
 
-# -- a folder for each state of the sources --------------------------------------------------------
+# -- one folder for each version of the sources ----------------------------------------------------
 
 
-def test_every_file_of_the_part_is_among_the_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_kernel_cache_depends_on_every_source_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     seen: list[Path] = []
 
-    def noting(kind: str, sources: Iterable[Path], *besides: str, root: Path | None = None) -> Path:
+    def recording(kind: str, sources: Iterable[Path], *besides: str, root: Path | None = None) -> Path:
         seen.extend(sources)
         return tmp_path
 
-    monkeypatch.setattr(cache, "cache_folder", noting)
+    monkeypatch.setattr(cache, "cache_folder", recording)
     uncached: Callable[[], Path | None] = kernel_cache.cache_folder.__wrapped__
     assert uncached() == tmp_path
     folders = [Path(str(module.__file__)).parent for module in (recursion, machine, kinematics)]
@@ -342,7 +339,7 @@ def test_every_file_of_the_part_is_among_the_sources(tmp_path: Path, monkeypatch
     assert files <= set(seen)
 
 
-def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
+def test_a_trusted_owner_of_parent_folders_may_not_own_the_cache(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     owner = tmp_path.stat().st_uid
@@ -353,7 +350,7 @@ def test_even_whom_one_trusts_above_a_folder_may_not_own_the_folder_itself(
 
 
 @pytest.mark.parametrize("changed", [0, 1, 2])
-def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: Path) -> None:
+def test_a_change_in_any_source_selects_another_folder(changed: int, tmp_path: Path) -> None:
     sources = [tmp_path / f"{name}.py" for name in "abc"]
     for source in sources:
         source.write_text("x = 1")
@@ -369,16 +366,17 @@ def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: 
     assert all(folder is not None and folder.is_dir() for folder in (first, *others))
 
 
-def test_what_nobody_used_for_a_month_is_deleted_and_nothing_else(tmp_path: Path) -> None:
-    old, recent, other = made(tmp_path, "old"), made(tmp_path, "recent"), made(tmp_path, "old", kind="trees")
+def test_only_folders_unused_for_a_month_are_deleted(tmp_path: Path) -> None:
+    old, recent = created(tmp_path, "old"), created(tmp_path, "recent")
+    other = created(tmp_path, "old", kind="trees")
     foreign = tmp_path / "kernels-of-somebody-else"
     foreign.mkdir()
     (old / "kernel.nbc").write_bytes(b"compiled")
     for folder, days in ((old, 30.1), (recent, 29.9), (other, 30.1)):
         then = time.time() - days * 24 * 3600
         os.utime(folder / ".used", (then, then))
-    used = made(tmp_path, "new")
+    used = created(tmp_path, "new")
     assert not old.exists()
     assert set(tmp_path.iterdir()) == {recent, other, foreign, used}
-    assert made(tmp_path, "old", kind="trees") == other
+    assert created(tmp_path, "old", kind="trees") == other
     assert other.exists()

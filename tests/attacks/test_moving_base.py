@@ -1,4 +1,4 @@
-"""A base's rotation means one thing, is kept as it was given, and is brought to Pinocchio by another way."""
+"""The rotation of a base is not changed, and Pinocchio receives it from independent code."""
 
 import copy
 import pickle
@@ -38,7 +38,7 @@ def at(R: FloatArray) -> FloatArray:
     return T
 
 
-def test_a_rotation_printed_with_nine_decimals_is_taken_and_one_that_is_exact_stays_so() -> None:
+def test_a_rotation_with_nine_decimals_is_accepted_and_an_exact_rotation_is_unchanged() -> None:
     # Of every five such matrices one was refused.
     R = np.round(exp_rotation(np.random.default_rng(0).normal(size=(2000, 3))), 9)
     assert BaseMotion(at(R)).placement.shape == (2000, 4, 4)
@@ -58,7 +58,7 @@ def nearest_at_50_digits(M: FloatArray) -> FloatArray:
 
 
 @pytest.mark.slow
-def test_both_sides_take_the_nearest_rotation_to_rounding() -> None:
+def test_urdfkin_and_the_oracle_find_the_same_nearest_rotation() -> None:
     ours, theirs = list[float](), list[float]()
     for M in orientations(60, 1):
         truth = nearest_at_50_digits(M)
@@ -70,7 +70,7 @@ def test_both_sides_take_the_nearest_rotation_to_rounding() -> None:
     assert max(theirs) < 8.0
 
 
-def test_the_numbers_are_kept_as_they_were_given_and_a_free_flyers_are_in_its_own_axes() -> None:
+def test_a_base_keeps_its_numbers_and_a_floating_joint_has_velocities_in_its_own_axes() -> None:
     T = at(orientations(200, 2))
     base = BaseMotion(T, np.arange(6.0))
     assert (base.placement == T).all()
@@ -85,7 +85,7 @@ def test_the_numbers_are_kept_as_they_were_given_and_a_free_flyers_are_in_its_ow
 
 
 @pytest.mark.parametrize("frame", ["a", "b"])
-def test_pinocchio_is_not_asked_about_urdfkins_rotation(monkeypatch: pytest.MonkeyPatch, frame: str) -> None:
+def test_pinocchio_does_not_use_the_rotation_of_urdfkin(monkeypatch: pytest.MonkeyPatch, frame: str) -> None:
     def turned_back(R: FloatArray, name: str) -> FloatArray:
         return np.swapaxes(nearest_rotation(R, name), -1, -2)
 
@@ -96,7 +96,7 @@ def test_pinocchio_is_not_asked_about_urdfkins_rotation(monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
-def test_a_turned_base_stays_well_within_the_bound(reference: str) -> None:
+def test_errors_on_a_rotated_base_are_well_within_the_bound(reference: str) -> None:
     generator, n = np.random.default_rng(5), 300
     arm = urdfkin.load(ARM)
     q, v, a = generator.normal(size=(3, n, 1))
@@ -111,7 +111,7 @@ def test_a_turned_base_stays_well_within_the_bound(reference: str) -> None:
     assert max(line.share for line in arm.certificate().lines) < 0.2
 
 
-def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
+def test_only_a_rotated_base_counts_as_a_joint_in_the_bound() -> None:
     plan, q = urdfkin.load(ARM).plan([0, 1]), np.zeros((1, 1))
     turned = BaseMotion(at(exp_rotation([0.0, 0.0, 1.0])))
     counts = [
@@ -121,7 +121,7 @@ def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
     assert counts == [[[1.0, 2.0]], [[1.0, 2.0]], [[2.0, 3.0]]]
 
 
-def test_the_base_of_each_sample_is_its_own() -> None:
+def test_each_sample_has_its_own_base() -> None:
     panda, generator = urdfkin.load("panda"), np.random.default_rng(7)
     q, v = panda.sample(6, 0).reshape(2, 3, 8), generator.normal(size=(3, 8))
     T = at(exp_rotation(generator.normal(size=(2, 1, 3))))

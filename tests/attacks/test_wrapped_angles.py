@@ -1,4 +1,4 @@
-"""A log that wraps its angles is read as the motion that was logged, and what was done to it is said."""
+"""A log with wrapped angles is read as the logged motion, with a note about each changed joint."""
 
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,8 @@ def arm_of(kind: str, more: str = "") -> Robot:
     return loaded(robot_of(joint("base", kind, "a", "b", 'xyz="1 0 0"', more=more)))
 
 
-def wheel(follower: str = "") -> Robot:
-    return loaded(robot_of(joint("wheel", "continuous", "a", "b", 'xyz="1 0 0"'), follower))
+def wheel(mimic_joint: str = "") -> Robot:
+    return loaded(robot_of(joint("wheel", "continuous", "a", "b", 'xyz="1 0 0"'), mimic_joint))
 
 
 def wrapped(angle: NDArray[Any]) -> NDArray[Any]:
@@ -40,7 +40,7 @@ def read(robot: Robot, path: Path, q: NDArray[Any], t: NDArray[Any] = T) -> Traj
 
 
 @pytest.mark.parametrize("start", [0.0, np.pi])
-def test_a_wheel_that_turns_steadily_has_a_steady_rate_wherever_its_log_wraps(
+def test_a_wheel_at_constant_speed_has_a_constant_rate_for_any_wrapped_log(
     start: float, tmp_path: Path
 ) -> None:
     angle = 2.0 * T + 0.3
@@ -53,7 +53,7 @@ def test_a_wheel_that_turns_steadily_has_a_steady_rate_wherever_its_log_wraps(
     assert "after unwrapping wheel" in motion.rates
 
 
-def test_a_wheel_turns_backwards_and_forwards_and_what_was_not_wrapped_keeps_its_bits(tmp_path: Path) -> None:
+def test_a_wheel_may_reverse_and_unwrapped_angles_do_not_change(tmp_path: Path) -> None:
     angle = 7.0 * np.sin(T)
     motion = read(wheel(), tmp_path / "w.csv", wrapped(angle))
     np.testing.assert_allclose(motion.q[:, 0], angle, atol=1e-12)
@@ -65,7 +65,7 @@ def test_a_wheel_turns_backwards_and_forwards_and_what_was_not_wrapped_keeps_its
     assert motion.rates == "by central differences"
 
 
-def test_a_revolute_joint_and_a_fast_wheel_that_was_never_wrapped_are_taken_as_written(
+def test_revolute_joints_and_fast_unwrapped_wheels_do_not_change(
     tmp_path: Path,
 ) -> None:
     angle = np.where(T < 2.0, 3.0, -3.0)
@@ -78,7 +78,7 @@ def test_a_revolute_joint_and_a_fast_wheel_that_was_never_wrapped_are_taken_as_w
     assert "span more than one turn and are not unwrapped" in note
 
 
-def test_a_step_of_nearly_half_a_turn_is_called_unsure(tmp_path: Path) -> None:
+def test_a_step_of_nearly_half_a_turn_is_reported_as_uncertain(tmp_path: Path) -> None:
     motion = read(wheel(), tmp_path / "w.csv", wrapped(2.9 * np.arange(len(T))))
     np.testing.assert_allclose(np.diff(motion.q[:, 0]), 2.9)
     assert any("the shorter direction is assumed, which may be wrong" in note for note in motion.notes)
@@ -89,12 +89,12 @@ def test_a_step_of_nearly_half_a_turn_is_called_unsure(tmp_path: Path) -> None:
     ("kind", "ratio", "told"),
     [("revolute", 0.5, True), ("revolute", 3.0, False), ("prismatic", 1.0, True), ("continuous", 0.5, True)],
 )
-def test_a_follower_goes_on_with_its_leader_and_is_told_where_that_changes_it(
+def test_a_mimic_joint_of_an_unwrapped_joint_is_reported(
     kind: str, ratio: float, told: bool, tmp_path: Path
 ) -> None:
     more = mimic("wheel", ratio) + limit(-6, 6)
-    follower = joint("f", kind, "b", "c", 'xyz="1 0 0"', more=more)
-    motion = read(wheel(follower), tmp_path / "w.csv", wrapped(2.0 * T))
+    mimic_joint = joint("f", kind, "b", "c", 'xyz="1 0 0"', more=more)
+    motion = read(wheel(mimic_joint), tmp_path / "w.csv", wrapped(2.0 * T))
     assert any("joint f follows wheel" in note for note in motion.notes) is told
     np.testing.assert_allclose(motion.q[:, 0], 2.0 * T, atol=1e-12)
 
@@ -123,7 +123,7 @@ def test_a_quaternion_that_changes_its_sign_is_the_same_orientation(tmp_path: Pa
     assert any("quaternion changes its sign" in note for note in motion.notes)
 
 
-def test_what_a_plot_verifies_is_the_formula_and_not_the_rates(tmp_path: Path) -> None:
+def test_a_plot_verifies_the_formula_and_not_the_rates(tmp_path: Path) -> None:
     robot = wheel()
     motion = read(robot, tmp_path / "w.csv", wrapped(2.0 * T))
     words = foot(frame_motion(robot, motion, "b"), motion)
@@ -132,7 +132,7 @@ def test_what_a_plot_verifies_is_the_formula_and_not_the_rates(tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_plot_tells_on_stderr_that_it_took_wraps_out(tmp_path: Path) -> None:
+def test_plot_prints_a_note_about_unwrapped_angles_on_stderr(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     robot = wheel()
     read(robot, tmp_path / "w.csv", wrapped(2.0 * T))

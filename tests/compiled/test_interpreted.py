@@ -1,4 +1,4 @@
-"""A few configurations are computed by Python's numbers, without Numba, and have the bits of the kernels."""
+"""Without Numba, Python numbers give a few configurations the same bits as the kernels."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_one_result_needs_no_cache(tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
 
 
-# -- when a kernel pays ----------------------------------------------------------------------------------
+# -- choice between kernels and Python -------------------------------------------------------------
 
 
 @pytest.fixture
@@ -146,7 +146,7 @@ def test_a_kernel_on_disk_is_loaded_when_more_time_is_spent_without_it(
     assert unspent == ["jacobians"]
 
 
-def test_a_kernel_that_is_not_on_disk_is_compiled_beside_and_a_large_batch_does_not_wait_for_that(
+def test_a_missing_kernel_is_compiled_in_the_background_and_a_large_batch_does_not_wait(
     unspent: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[str] = []
@@ -206,7 +206,7 @@ def _ends(pid: int) -> bool:
 
 
 @pytest.mark.long
-def test_the_kernel_from_beside_is_used_as_soon_as_it_is_there(tmp_path: Path) -> None:
+def test_a_kernel_compiled_in_the_background_is_used_when_it_is_ready(tmp_path: Path) -> None:
     code = """
 import time
 from urdfkin.compiled import preload
@@ -223,7 +223,7 @@ print("placements" in preload._loaded)
 
 
 @pytest.mark.slow
-def test_many_single_calls_end_in_the_function_for_single_calls() -> None:
+def test_after_many_single_calls_the_function_for_single_calls_is_used() -> None:
     robot: Robot = urdfkin.load("panda", verify=False)
     q, begin = robot.neutral(), time.perf_counter()
     fast: Any = robot._prepare("panda_hand", Reference.LOCAL_WORLD_ALIGNED)

@@ -1,4 +1,4 @@
-"""Kernels: batches, the parts of an acceleration and the rate of the Jacobian."""
+"""Kernels for batches, and the breakdown of an acceleration."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -39,7 +39,7 @@ def test_results_are_equal_to_the_last_bit_for_any_number_of_threads(panda: urdf
 
 @pytest.mark.parametrize("offset", range(8))
 @pytest.mark.parametrize("n", [1, LANES, 3 * LANES + 5])
-def test_what_is_written_past_the_caches_is_the_same_wherever_it_begins(
+def test_streaming_stores_give_the_same_bits_at_any_address(
     panda: urdfkin.Robot, monkeypatch: pytest.MonkeyPatch, offset: int, n: int
 ) -> None:
     q = panda.sample(n, seed=7)
@@ -65,7 +65,7 @@ def _between(expected: FloatArray, offset: int) -> Iterator[FloatArray]:
     assert (around[offset + expected.size :] == np.pi).all()
 
 
-def test_what_was_bad_in_any_part_is_told() -> None:
+def test_an_error_in_the_rows_of_any_thread_is_reported() -> None:
     def compute(inputs: Sequence[FloatArray], out: FloatArray) -> int:
         out[:] = inputs[1][:, :1]
         return int(inputs[1][:, 0].max())
@@ -80,7 +80,7 @@ def test_what_was_bad_in_any_part_is_told() -> None:
             np.testing.assert_array_equal(out[:, 0], q[:, 0])
 
 
-# -- the parts of an acceleration: each is what it says, and together they are the whole ---------------------
+# -- breakdown of an acceleration ------------------------------------------------------------------
 
 
 ROOM = 64 * np.finfo(np.float64).eps * 30.0
@@ -139,4 +139,4 @@ def test_a_batch_may_be_empty(odd: KinematicTree) -> None:
     assert acceleration_breakdown(odd, 5, q[:0], v[:0], a[:0]).total.shape == (0, 6)
 
 
-# -- the rate of the Jacobian: a derivative, a part of the acceleration, in three references -----------------
+# -- rate of the Jacobian --------------------------------------------------------------------------

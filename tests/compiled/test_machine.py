@@ -1,4 +1,4 @@
-"""Below the kernels: compiling, memory, and sine and cosine."""
+"""Compilation, memory access, and sine and cosine of the kernels."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_a_single_configuration_is_written_to_its_last_number_and_no_further(nam
 
 
 @pytest.mark.parametrize("n", COUNTS)
-def test_so_are_all_frames_and_each_part_of_each_thread(n: int) -> None:
+def test_all_frames_are_written_to_their_last_number_and_no_further_by_any_thread(n: int) -> None:
     robot = robot_of("tree_8")
     q, v, a = state(robot, n, 3)
     plan = robot.plan(range(len(robot.link_names)))
@@ -149,7 +149,7 @@ def test_a_batch_is_read_to_its_last_number_and_no_further(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_plan_comes_back_from_a_pickle_with_addresses_of_its_own() -> None:
+def test_an_unpickled_plan_has_its_own_addresses() -> None:
     robot = urdfkin.load("a1", verify=False)
     links = [robot.tree.frame_link(frame) for frame in ("FR_foot", "RL_hip", "trunk")]
     q, v, a = state(robot, 21, 4)
@@ -172,7 +172,7 @@ def test_a_plan_comes_back_from_a_pickle_with_addresses_of_its_own() -> None:
     assert not any(x.flags.writeable for x in (again.steps, again.geometry, again.leaders))
 
 
-# -- sine and cosine of the walk, against fifty digits -------------------------------------------------------
+# -- sine and cosine, compared at fifty digits -----------------------------------------------------
 
 
 ONE_JOINT = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
@@ -200,12 +200,12 @@ def test_sine_and_cosine_are_right_to_two_thirds_of_a_unit_in_the_last_place(lar
 
 
 @pytest.mark.slow
-def test_their_typical_error_is_that_of_rounding() -> None:
+def test_the_typical_error_of_sine_and_cosine_is_that_of_rounding() -> None:
     off = units_off(np.random.default_rng(1).uniform(-np.pi, np.pi, 5000))
     assert np.sqrt(np.square(off).mean(axis=0)).max() < 1.02 / np.sqrt(12.0)
 
 
-def test_beside_a_multiple_of_a_right_angle_the_smaller_one_is_right_to_1e_27() -> None:
+def test_near_a_multiple_of_a_right_angle_the_smaller_of_sine_and_cosine_is_correct_to_1e_27() -> None:
     turns = np.arange(-200, 201) * (np.pi / 2.0)
     angles = np.concatenate([np.nextafter(turns, -np.inf), turns, np.nextafter(turns, np.inf)])
     off = np.abs(units_off(angles))

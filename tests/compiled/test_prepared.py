@@ -1,4 +1,4 @@
-"""A prepared frame does what the robot's long way does, with the same result or the same error."""
+"""A prepared frame gives the same result or error as the robot's general implementation."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def outcome(compute: Callable[[], FloatArray]) -> FloatArray | str:
 def ways(
     robot: Robot, frame: str, method: str, inputs: tuple[Any, ...], **out: Any
 ) -> list[FloatArray | str]:
-    """A method by a prepared frame, by the robot as it comes, and by the robot's long way."""
+    """Results of a prepared frame, of the robot, and of the robot with one thread (no prepared frame)."""
     fast, by_robot = getattr(robot.prepare(frame, "local"), method), getattr(robot, method)
     reference = () if method == "placement" else ("local",)
     return [
@@ -71,7 +71,7 @@ _PACKED["x"] = 0.25
 _READ_ONLY = np.linspace(-1.0, 1.0, 8)
 _READ_ONLY.setflags(write=False)
 
-#: What an array of 8 numbers may be given as.
+#: Inputs for an array of 8 numbers, valid and invalid.
 GIVEN: dict[str, Any] = {
     "a list": [0.1] * 8,
     "a tuple of whole numbers": (1,) * 8,
@@ -115,7 +115,7 @@ GIVEN: dict[str, Any] = {
 @pytest.mark.slow
 @pytest.mark.parametrize("given", GIVEN)
 @pytest.mark.parametrize("method", METHODS)
-def test_whatever_is_given(panda: Robot, method: str, given: str) -> None:
+def test_unusual_inputs_give_the_same_result_or_error(panda: Robot, method: str, given: str) -> None:
     usual = [np.linspace(-0.5, 0.9, 8), np.linspace(1.0, -1.0, 8), np.full(8, 0.3)][: METHODS[method]]
     for place in range(len(usual)):
         inputs = tuple(GIVEN[given] if i == place else x for i, x in enumerate(usual))
@@ -125,7 +125,7 @@ def test_whatever_is_given(panda: Robot, method: str, given: str) -> None:
 _FROZEN = np.zeros((6, 8))
 _FROZEN.setflags(write=False)
 
-#: What a Jacobian may be asked to be written into.
+#: Values of `out` for a Jacobian, valid and invalid.
 OUTS: dict[str, Any] = {
     "right": np.full((6, 8), np.nan),
     "of the wrong shape": np.zeros((8, 6)),
@@ -143,7 +143,7 @@ OUTS: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("out", OUTS)
-def test_whatever_it_is_written_into(panda: Robot, out: str) -> None:
+def test_unusual_outs_give_the_same_result_or_error(panda: Robot, out: str) -> None:
     q = np.linspace(-0.5, 0.9, 8)
     outcomes = ways(panda, FRAME, "jacobian", (q,), out=OUTS[out])
     assert agree(outcomes)
@@ -154,7 +154,7 @@ def test_whatever_it_is_written_into(panda: Robot, out: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_out_is_what_comes_back(panda: Robot, method: str) -> None:
+def test_out_is_returned(panda: Robot, method: str) -> None:
     inputs = [x[0] for x in state(panda, 1, 1)][: METHODS[method]]
     fast = getattr(panda.prepare(FRAME), method)
     expected = fast(*inputs)
@@ -166,7 +166,7 @@ def test_out_is_what_comes_back(panda: Robot, method: str) -> None:
     assert not differing(listed, expected)
 
 
-def test_an_out_that_shares_memory_with_an_input_is_refused_and_left_alone() -> None:
+def test_an_out_that_shares_memory_with_an_input_is_refused_and_not_changed() -> None:
     robot = urdfkin.load("ur5", verify=False)
     memory = np.linspace(-1.0, 1.0, 60)
     before = memory.copy()
@@ -188,12 +188,12 @@ def test_an_out_that_shares_memory_with_an_input_is_refused_and_left_alone() -> 
         with pytest.raises(InputError, match=words):
             robot.prepare("tool0").placement(memory[start : start + 6], out=memory[6:22].reshape(4, 4))
     assert (memory == before).all()
-    # Side by side is not shared.
+    # Adjacent arrays share no memory.
     robot.prepare("tool0").velocity(np.ones(6), memory[:6], out=memory[6:12])
     robot.prepare("tool0").velocity(np.ones(6), memory[12:18], out=memory[6:12])
 
 
-def test_results_are_the_callers_own(panda: Robot) -> None:
+def test_results_share_no_memory(panda: Robot) -> None:
     for method, count in METHODS.items():
         inputs = [x[0] for x in state(panda, 1, 2)][:count]
         fast = getattr(panda.prepare(FRAME), method)
@@ -210,13 +210,13 @@ def test_results_are_the_callers_own(panda: Robot) -> None:
 
 @pytest.mark.parametrize("root_joint", [None, "floating"])
 @pytest.mark.parametrize("name", ["floating_root", "planar_and_floating_in_the_middle", "a1"])
-def test_a_floating_joints_quaternion_is_made_exact(name: str, root_joint: str | None) -> None:
+def test_the_quaternion_of_a_floating_joint_is_normalised(name: str, root_joint: str | None) -> None:
     robot = robot_of(name, root_joint=root_joint if name == "a1" else None)
     q, v, a = (x[0] for x in state(robot, 1, 3))
     for method, count in METHODS.items():
         inputs = (q, v, a)[:count]
         assert agree(ways(robot, robot.tip_frame, method, inputs))
-        nearly = (q * (1.0 + 4e-7), v, a)[:count]  # nothing but a quaternion minds
+        nearly = (q * (1.0 + 4e-7), v, a)[:count]  # Only a quaternion is restricted.
         assert agree(ways(robot, robot.tip_frame, method, nearly))
         off = (q * 1.01, v, a)[:count]
         outcomes = ways(robot, robot.tip_frame, method, off)
@@ -225,16 +225,16 @@ def test_a_floating_joints_quaternion_is_made_exact(name: str, root_joint: str |
         assert isinstance(outcomes[0], str) == floats
 
 
-def test_names_that_do_not_exist_are_refused_in_the_robots_words(panda: Robot) -> None:
+def test_unknown_names_raise_the_same_error_as_the_robot(panda: Robot) -> None:
     q = panda.neutral()
-    panda.jacobian(q, FRAME, Reference.WORLD)  # what was asked for before must not count
+    panda.jacobian(q, FRAME, Reference.WORLD)  # An earlier call must not change the errors.
     for frame in ("pnda_hand", "", 3):
         with pytest.raises((InputError, UnknownNameError)) as long:
             panda.jacobian(q, frame, threads=1)  # type: ignore[arg-type]
         for way in (panda.prepare, lambda frame: panda.jacobian(q, frame)):
             with pytest.raises(type(long.value)) as caught:
                 way(frame)  # type: ignore[arg-type]
-            # Only one frame is prepared; a robot may be asked for several.
+            # A robot also accepts several frames, and its message for other types says so.
             assert str(caught.value) == str(long.value) or (
                 way == panda.prepare and not isinstance(frame, str)
             )
@@ -254,7 +254,7 @@ def test_a_robot_where_nothing_moves_has_empty_jacobians() -> None:
     assert not fast.velocity(np.zeros(0), np.zeros(0)).any()
 
 
-def test_a_copy_works_after_what_it_was_made_from_is_gone() -> None:
+def test_a_copy_works_after_the_original_is_deleted() -> None:
     robot = urdfkin.load("panda", verify=False)
     q, fast = robot.sample(1, 5)[0], robot.prepare(FRAME, "world")
     expected = fast.jacobian(q)
@@ -269,7 +269,7 @@ def test_a_copy_works_after_what_it_was_made_from_is_gone() -> None:
 
 
 @pytest.mark.slow
-def test_it_goes_to_another_process(tmp_path: Any) -> None:
+def test_a_prepared_frame_can_be_sent_to_another_process(tmp_path: Any) -> None:
     robot = urdfkin.load("panda", verify=False)
     q, fast = robot.sample(1, 6)[0], robot.prepare(FRAME)
     (tmp_path / "fast").write_bytes(pickle.dumps((fast, q, fast.jacobian(q))))
@@ -280,7 +280,7 @@ def test_it_goes_to_another_process(tmp_path: Any) -> None:
     assert python(program, str(tmp_path / "fast")).stderr == ""
 
 
-def test_functions_take_their_own_number_of_arguments_and_no_other(panda: Robot) -> None:
+def test_a_wrong_number_of_arguments_returns_none(panda: Robot) -> None:
     q, fast = panda.neutral(), panda.prepare(FRAME)
     fast.jacobian(q)
     compute, task = single("jacobian", panda.plan([panda.tree.frame_link(FRAME)]), fast.reference)
@@ -291,12 +291,12 @@ def test_functions_take_their_own_number_of_arguments_and_no_other(panda: Robot)
     assert task[KernelArgs.COUNT] == 1
 
 
-def test_arrays_lie_in_memory_as_compiled_code_reads_them() -> None:
+def test_the_memory_layout_of_arrays_is_known() -> None:
     assert arrays_are_known()
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_arguments_and_results_are_held_as_often_as_they_are_used(panda: Robot, method: str) -> None:
+def test_reference_counts_do_not_change(panda: Robot, method: str) -> None:
     inputs = [x[0] for x in state(panda, 1, 7)][: METHODS[method]]
     fast = getattr(panda.prepare(FRAME), method)
     out, wrong = fast(*inputs), np.zeros(5)
@@ -310,7 +310,7 @@ def test_arguments_and_results_are_held_as_often_as_they_are_used(panda: Robot, 
     assert [sys.getrefcount(thing) for thing in things] == before
 
 
-def test_while_one_thread_is_at_work_another_gets_the_same_by_the_robots_way(panda: Robot) -> None:
+def test_while_the_function_is_busy_the_robot_computes_the_same_result(panda: Robot) -> None:
     q, fast = panda.sample(1, 8)[0], panda.prepare(FRAME)
     expected = fast.jacobian(q)
     task = fast._jacobian.__self__[0]  # type: ignore[attr-defined]
@@ -325,7 +325,7 @@ def test_while_one_thread_is_at_work_another_gets_the_same_by_the_robots_way(pan
     assert not differing(again, expected)
 
 
-def test_threads_that_share_one_get_their_own_results() -> None:
+def test_threads_that_share_a_prepared_frame_get_their_own_results() -> None:
     robot = urdfkin.load("panda", verify=False)
     fast, qs = robot.prepare(FRAME), robot.sample(4, 9)
     expected = robot.jacobian(qs, FRAME, threads=1)
@@ -342,7 +342,7 @@ def test_threads_that_share_one_get_their_own_results() -> None:
 
 
 @pytest.mark.slow
-def test_threads_that_share_one_without_the_interpreters_lock_get_right_results_or_none() -> None:
+def test_threads_without_the_interpreter_lock_get_correct_results_or_none() -> None:
     robot = urdfkin.load("panda", verify=False)
     fast, qs = robot.prepare(FRAME), robot.sample(2, 10)
     expected = robot.jacobian(qs, FRAME, threads=1)
@@ -374,4 +374,4 @@ def test_threads_that_share_one_without_the_interpreters_lock_get_right_results_
         (first, wrong), (second, also_wrong) = pool.map(work, range(2))
     assert (wrong, also_wrong) == (0, 0)
     assert bound[0][KernelArgs.COUNT] - begun_with == first + second
-    assert max(first, second) > 0  # one may find the other at work each time
+    assert max(first, second) > 0  # A thread may find the function busy at each call.

@@ -1,4 +1,4 @@
-"""The equations on lengths bound the same equations on vectors, and nothing but zero vanishes."""
+"""The equations for lengths bound the equations for vectors; only zero has the length zero."""
 
 import inspect
 from types import FunctionType
@@ -53,7 +53,7 @@ def both(result: Any) -> tuple[Any, ...]:
 @pytest.mark.parametrize("name", EQUATIONS)
 @given(data=st.data())
 @settings(max_examples=60)
-def test_no_result_of_an_equation_is_longer_than_it_is_on_lengths(name: str, data: st.DataObject) -> None:
+def test_the_length_of_a_result_is_at_most_the_result_for_lengths(name: str, data: st.DataObject) -> None:
     given: dict[str, Any] = {
         x: data.draw(rotations if x == "R" else numbers if x in numbers_of(name) else vectors)
         for x in parameters(name)
@@ -73,7 +73,7 @@ def test_no_result_of_an_equation_is_longer_than_it_is_on_lengths(name: str, dat
 @pytest.mark.parametrize("name", EQUATIONS)
 @given(data=st.data())
 @settings(max_examples=30)
-def test_what_is_longer_makes_nothing_shorter(name: str, data: st.DataObject) -> None:
+def test_longer_inputs_never_give_shorter_results(name: str, data: st.DataObject) -> None:
     pairs = {x: sorted((data.draw(sizes), data.draw(sizes))) for x in parameters(name)}
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         shorter, longer = (

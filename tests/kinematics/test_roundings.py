@@ -1,4 +1,4 @@
-"""The counts that bounds are made of, found by the equations on numbers that remember their roundings."""
+"""The counts of roundings in the bounds, measured with numbers that record their roundings."""
 
 import ast
 import itertools
@@ -130,7 +130,7 @@ PARTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PARTS)
-def test_no_part_of_a_joint_rounds_more_than_the_table_says_nor_much_less(name: str) -> None:
+def test_the_table_of_roundings_is_sufficient_and_not_much_too_large(name: str) -> None:
     part, counted = PARTS[name]
     assert 0.8 * counted < most(all_conspiring, part) <= counted
     table = (roundings.__doc__ or "").split("**A base**")[0]
@@ -138,7 +138,7 @@ def test_no_part_of_a_joint_rounds_more_than_the_table_says_nor_much_less(name: 
 
 
 @pytest.mark.slow
-def test_all_of_a_joints_roundings_conspiring_are_within_the_count() -> None:
+def test_the_sum_of_all_roundings_of_a_joint_is_within_the_count() -> None:
     together = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of Pinocchio's"][1]
     assert together == pytest.approx(22.5)
     assert together < roundings.ROUNDINGS
@@ -147,7 +147,7 @@ def test_all_of_a_joints_roundings_conspiring_are_within_the_count() -> None:
     assert with_mujoco + 1.5 < roundings.MUJOCO
 
 
-def test_a_file_of_round_angles_is_snapped_by_less_than_a_turn_counts_as() -> None:
+def test_snapping_rounded_angles_changes_them_less_than_one_rotation_may_round() -> None:
     angles = [nearest_twelfth(k * math.pi / 12.0) for k in range(-11, 13)]
     rpy = np.array(list(itertools.product(angles[::2], angles[5:18], angles[::2])))
     for R in rotation_from_rpy(rpy):
@@ -168,7 +168,7 @@ def multiples_of_eps(tree: ast.AST) -> list[int]:
     return lines
 
 
-def test_no_tolerance_is_typed_elsewhere() -> None:
+def test_no_other_file_contains_a_tolerance() -> None:
     homes = {"roundings.py", "bounds.py"}
     lone = [
         f"{path.relative_to(PACKAGE)}:{line}"

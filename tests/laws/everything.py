@@ -1,4 +1,4 @@
-"""Every quantity that a single configuration has, in every reference, by one way or another."""
+"""All quantities of one configuration in each reference, computed in different ways."""
 
 from __future__ import annotations
 

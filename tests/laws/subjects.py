@@ -1,4 +1,4 @@
-"""Robots that the laws are tried on: every joint kind, followers, branches, real and made up."""
+"""Real and generated robots for the laws, with all joint kinds, mimic joints and branches."""
 
 import numpy as np
 import pinocchio as pin

@@ -1,4 +1,4 @@
-"""A configuration has the same result, to the last bit, alone, prepared, and as any row of a batch."""
+"""A configuration has the same bits alone, in a prepared frame, and in any row of a batch."""
 
 import math
 import tracemalloc
@@ -51,7 +51,7 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 @pytest.mark.parametrize("shape", [(), (1,), (0,), (5,), (16,), (2, 0, 3), (2, 3), (1, 4, 1, 5)])
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_any_leading_shape_comes_back(quantity: str, shape: tuple[int, ...]) -> None:
+def test_results_have_the_leading_shape_of_the_inputs(quantity: str, shape: tuple[int, ...]) -> None:
     robot = robot_of("tree_3")
     compute = QUANTITIES[quantity]
     q, v, a = state(robot, int(np.prod(shape)), 2)
@@ -88,7 +88,7 @@ def _thinned(data: st.DataObject, shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(1 if data.draw(st.booleans()) else size for size in shape[cut:])
 
 
-def test_memory_of_any_layout_and_type_is_read_right() -> None:
+def test_inputs_of_any_memory_layout_and_type_give_the_same_result() -> None:
     robot = load("panda")
     q = robot.sample(12, 4)
     straight = robot.jacobian(q, "panda_hand")
@@ -105,7 +105,7 @@ def test_memory_of_any_layout_and_type_is_read_right() -> None:
         ).all()
 
 
-def test_inputs_are_left_as_they_were_and_results_belong_to_the_caller() -> None:
+def test_inputs_do_not_change_and_results_are_not_shared() -> None:
     robot = load("ur5")
     q = robot.sample(4, 5)
     before = q.copy()
@@ -116,9 +116,7 @@ def test_inputs_are_left_as_they_were_and_results_belong_to_the_caller() -> None
 
 @pytest.mark.parametrize("shape", [(), (3,), (2, 17), (0,)])
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_out_is_written_and_handed_back_by_one_thread_and_by_several(
-    quantity: str, shape: tuple[int, ...]
-) -> None:
+def test_out_is_written_and_returned_for_any_number_of_threads(quantity: str, shape: tuple[int, ...]) -> None:
     robot, compute = load("panda"), QUANTITIES[quantity]
     q, v, a = (x.reshape(*shape, 8) for x in state(robot, int(np.prod(shape)), 6))
     expected = compute(robot, q, v, a)
@@ -131,7 +129,7 @@ def test_out_is_written_and_handed_back_by_one_thread_and_by_several(
     assert (compute(robot, q, v, a, threads=2) == expected).all()
 
 
-def test_an_out_of_another_shape_or_with_memory_of_an_input_is_refused_and_left_alone() -> None:
+def test_an_out_of_a_wrong_shape_or_with_memory_of_an_input_is_refused() -> None:
     robot = load("ur5")
     q, v = robot.sample(3, 7), np.ones((3, 6))
     for out in (np.zeros((3, 6, 7)), np.zeros((6, 6)), np.zeros((3, 6, 6), order="F")):
@@ -159,7 +157,7 @@ NOT_PLAIN: dict[str, Callable[[tuple[int, ...]], Any]] = {
 
 @pytest.mark.parametrize("kind", NOT_PLAIN)
 @pytest.mark.filterwarnings("ignore:the matrix subclass:PendingDeprecationWarning")
-def test_an_out_that_is_no_plain_array_is_refused_before_a_kernel_writes(kind: str) -> None:
+def test_an_out_that_is_no_plain_array_is_refused_and_not_changed(kind: str) -> None:
     robot = load("ur5", verify=False)
     q, one, table = robot.sample(1, 1)[0], NOT_PLAIN[kind]((6, 6)), NOT_PLAIN[kind]((4, 4))
     prepared, compiled = robot.prepare("tool0"), robot.compiled("tool0")
@@ -182,7 +180,7 @@ def test_an_out_that_is_no_plain_array_is_refused_before_a_kernel_writes(kind: s
     assert not np.asarray(table).any()
 
 
-def test_an_out_may_be_a_file_in_memory(tmp_path: Path) -> None:
+def test_an_out_may_be_a_memory_mapped_file(tmp_path: Path) -> None:
     robot = load("ur5")
     q = robot.sample(5, 1)
     out = np.memmap(tmp_path / "jacobians", np.float64, "w+", shape=(5, 6, 6))
@@ -199,7 +197,7 @@ def test_a_q_of_views_of_out_is_read_before_out_is_written() -> None:
 
 
 @pytest.mark.slow
-def test_threads_get_what_a_single_one_gets() -> None:
+def test_concurrent_threads_get_the_same_results_as_one_thread() -> None:
     robot = load("a1")
     batches = [state(robot, n, n) for n in (1, 5, 16, 40, 100, 3, 64, 33) * 3]
     frames = robot.link_names
@@ -229,7 +227,7 @@ def test_threads_get_what_a_single_one_gets() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("single", ["q", "v", "a", "qv", "qa", "va"])
-def test_one_configuration_for_many_rates_is_as_if_it_had_been_repeated(single: str, threads: int) -> None:
+def test_one_configuration_with_many_rates_equals_repeated_configurations(single: str, threads: int) -> None:
     robot, n = robot_of("mimic_hand_40_sliding"), 5 * LANES + 3
     full = dict(zip("qva", state(robot, n, 9), strict=True))
     repeated = {name: np.repeat(x[:1], n, axis=0) if name in single else x for name, x in full.items()}
@@ -248,7 +246,7 @@ def test_one_configuration_for_many_rates_is_as_if_it_had_been_repeated(single: 
             assert not differing(np.broadcast_to(one, other.shape), other)
 
 
-def test_one_configuration_for_many_rates_is_not_copied_for_each() -> None:
+def test_one_configuration_with_many_rates_is_not_copied() -> None:
     robot, n = load("panda", verify=False), 100_000
     q, v, a = state(robot, n, 10)
     out = np.empty((n, 6))
@@ -278,7 +276,7 @@ def test_an_analytical_jacobian_is_the_same_by_parts_threads_and_into_an_array(r
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_the_nearest_to_a_singularity_is_told_whichever_part_it_is_in(threads: int) -> None:
+def test_the_sample_nearest_to_a_singularity_is_named(threads: int) -> None:
     robot = load("ur5", verify=False)
     q, _, _ = state(robot, 3 * PART, 15)
     distances = singularity_distance("ZYZ", euler_of("ZYZ", robot.placement(q, "tool0")[:, :3, :3]))
@@ -308,7 +306,7 @@ def test_a_breakdown_is_the_same_by_parts_threads_and_into_an_array(reference: R
         ask(q, v, a, out=out[:-1])
 
 
-def test_a_breakdown_whose_part_overflows_says_in_which_samples() -> None:
+def test_the_error_of_an_overflow_in_a_breakdown_names_the_samples() -> None:
     robot = load("ur5", verify=False)
     q, v, a = state(robot, 2 * PART, 14)
     v[PART + 3] = 1e200
@@ -316,7 +314,7 @@ def test_a_breakdown_whose_part_overflows_says_in_which_samples() -> None:
         robot.acceleration_breakdown(q, v, a, "tool0", threads=2)
 
 
-# -- a configuration has the same result, to the last bit, alone, prepared, and as any row of a batch --------
+# -- bits of single configurations and of batches --------------------------------------------------
 
 #: Rows of a block, of the next, and of one that was filled up.
 SAMPLES = 2 * LANES + 3
@@ -388,7 +386,7 @@ def test_planar_floating_and_following_joints(floating: bool) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("branches", "joints"), [(2, 4), (3, 8), (5, 7), (4, 17)])
-def test_each_tip_of_a_tree_though_it_needs_only_some_of_the_coordinates(branches: int, joints: int) -> None:
+def test_each_tip_of_a_tree(branches: int, joints: int) -> None:
     robot = broom(branches, joints)
     for leaf in robot.tree.leaves():
         assert list(faults(robot, robot.tree.frame_name(leaf), *state(robot, LANES + 1, 4))) == []
@@ -403,7 +401,7 @@ def test_each_frame_of_a_tree_is_the_same_among_all_and_by_itself(name: str) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [1e5, 1e7, 1e300])
-def test_large_angles_do_not_change_what_stands_beside_them(size: float) -> None:
+def test_large_angles_do_not_change_other_rows(size: float) -> None:
     for robot in (robot_of("panda"), mixed(floating=True)):
         q, v, a = state(robot, SAMPLES, 6)
         ours = robot.tree.q_index[robot.tree.joint_index(robot.joint_names[0])]

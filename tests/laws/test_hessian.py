@@ -1,4 +1,4 @@
-"""The Hessian is the derivative of the Jacobian by each rate: at fifty digits, summed, by its symmetries."""
+"""The Hessian is the derivative of the Jacobian with respect to each joint, checked at fifty digits."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def truths(robot: Robot, q: FloatArray, link: int, reference: Reference) -> tupl
 @pytest.mark.slow
 @pytest.mark.parametrize("reference", Reference)
 @pytest.mark.parametrize("name", ["panda", "floating_root", "planar_and_floating_in_the_middle", "tree_3"])
-def test_it_is_the_difference_quotient_of_the_jacobian_at_fifty_digits(
+def test_the_hessian_is_the_difference_quotient_of_the_jacobian_at_fifty_digits(
     name: str, reference: Reference
 ) -> None:
     robot = robot_of(name)
@@ -87,7 +87,7 @@ def test_it_is_the_difference_quotient_of_the_jacobian_at_fifty_digits(
 @pytest.mark.slow
 @pytest.mark.parametrize("reference", Reference)
 @pytest.mark.parametrize("name", NAMES)
-def test_summed_over_the_rates_it_is_the_jacobians_rate(name: str, reference: Reference) -> None:
+def test_the_hessian_times_the_rates_is_the_jacobian_rate(name: str, reference: Reference) -> None:
     robot = robot_of(name)
     q, v, _ = state(robot, 9, 4)
     frames = robot.link_frames[-3:]
@@ -124,7 +124,7 @@ def test_on_a_planar_arm_the_angular_rows_are_zero() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_from_one_reference_to_the_other_the_axes_and_the_point_move_too(name: str) -> None:
+def test_hessians_in_two_references_differ_by_the_motion_of_axes_and_point(name: str) -> None:
     robot = robot_of(name)
     q, _, _ = state(robot, 5, 6)
     frame = robot.tip_frame
@@ -140,7 +140,7 @@ def test_from_one_reference_to_the_other_the_axes_and_the_point_move_too(name: s
 def test_a_base_moves_the_hessian_as_it_moves_the_jacobian() -> None:
     robot = urdfkin.load("panda")
     q = robot.sample(4)
-    T = pose([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]], [1.0, 2.0, 3.0])
+    T = pose([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [1.0, 2.0, 3.0])
     on_base = robot.hessian(q, "panda_hand", base=BaseMotion(T, np.ones(6), np.ones(6)))
     here = robot.hessian(q, "panda_hand").reshape(4, 2, 3, robot.nv, robot.nv)
     np.testing.assert_allclose(
@@ -148,14 +148,14 @@ def test_a_base_moves_the_hessian_as_it_moves_the_jacobian() -> None:
     )
 
 
-def test_an_error_of_a_millionth_of_a_millionth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_of_1e_12_in_the_hessian_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     robot, original = urdfkin.load("panda"), evaluate.hessians
     monkeypatch.setattr(evaluate, "hessians", lambda *x, **how: original(*x, **how) * (1.0 + 1e-11))
     with pytest.raises(urdfkin.VerificationError, match="the hessian of panda_hand"):
         robot.hessian(robot.sample(20), "panda_hand")
 
 
-# -- what Pinocchio 4.1 does, which the oracle puts right: when one of these fails, that can go ------------
+# -- behaviour of Pinocchio 4.1 that the oracle corrects; if a test fails, remove the correction ---
 
 
 def pinocchios(model: Any, q: FloatArray, reference: Any) -> tuple[FloatArray, FloatArray]:

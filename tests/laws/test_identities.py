@@ -1,4 +1,4 @@
-"""Identities that hold for any robot, whatever Pinocchio says."""
+"""Identities that hold for any robot, checked without Pinocchio."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def turned(R: FloatArray, six: FloatArray) -> FloatArray:
     return back
 
 
-def test_the_power_of_a_wrench_and_the_torques_it_asks_for_do_not_depend_on_the_reference(
+def test_the_power_and_the_joint_torques_of_a_wrench_do_not_depend_on_the_reference(
     robot: Robot,
 ) -> None:
     q, v, _ = state(robot, 17, 4)
@@ -155,9 +155,9 @@ def test_a_moving_base_is_the_same_robot_on_a_floating_root_joint(name: str) -> 
 @pytest.mark.parametrize("name", ["panda", "mimic_hand_40_sliding", "followers_of_followers", "tree_8"])
 def test_the_jacobian_of_coupled_joints_is_that_of_free_ones_times_g(name: str) -> None:
     coupled, free = robot_of(name), robot_of(name, mimic=False)
-    followers = [joint for joint in coupled.tree.joints if joint.mimic]
-    assert followers
-    assert free.nv == coupled.nv + len(followers)
+    mimic_joints = [joint for joint in coupled.tree.joints if joint.mimic]
+    assert mimic_joints
+    assert free.nv == coupled.nv + len(mimic_joints)
     q, v, a = state(coupled, 7, 10)
     G, q_free = np.zeros((free.nv, coupled.nv)), np.zeros((7, free.nq))
     for i, joint in enumerate(coupled.tree.joints):
@@ -175,7 +175,7 @@ def test_the_jacobian_of_coupled_joints_is_that_of_free_ones_times_g(name: str) 
             assert close(coupled.acceleration(q, v, a, frame, reference), acceleration)
 
 
-def test_an_elbow_of_three_and_four_metres_is_where_pythagoras_puts_it() -> None:
+def test_an_elbow_of_three_and_four_metres_has_its_tip_at_five_metres() -> None:
     # By hand, in whole numbers: two links of 3 m and 4 m at a right angle.
     urdf = Urdf("elbow", 0)
     urdf.add("continuous", axis='<axis xyz="0 0 1"/>', origin="")
@@ -222,7 +222,7 @@ def test_the_jacobian_and_its_rate_make_the_acceleration(name: str) -> None:
         assert (np.abs(total - expected) <= allowed).all(), reference
 
 
-# -- the Jacobian and the acceleration are derivatives of the placement: a study of the step size ------------
+# -- difference quotients for several step sizes ---------------------------------------------------
 
 STEPS = 2.0 ** -np.arange(3.0, 26.0)
 
@@ -283,9 +283,9 @@ def test_a_jacobian_that_is_slightly_wrong_does_not_pass(monkeypatch: pytest.Mon
         assert_converges(linear + 1e-7, reach, 1)
 
 
-# -- a placement in another frame: how such placements compose, and how they are held ------------------------
+# -- relative placements ---------------------------------------------------------------------------
 
-#: Frames of one branch and of two, up the tree, down and across; a base that moves by itself, a follower.
+#: Pairs of frames on one branch and on two, in both directions; also with a mimic joint.
 TRIPLES = {
     "panda": (
         ("panda_link4", "panda_hand", "panda_leftfinger"),
@@ -299,7 +299,7 @@ TRIPLES = {
     ("name", "frames", "root_joint"),
     [(name, frames, joint) for name in TRIPLES for frames in TRIPLES[name] for joint in (None, "floating")],
 )
-def test_neighbours_cancel_and_the_way_back_is_the_inverse(
+def test_relative_placements_are_composed_and_inverted(
     name: str, frames: tuple[str, str, str], root_joint: str | None
 ) -> None:
     robot = urdfkin.load(name, root_joint=root_joint)
@@ -315,7 +315,7 @@ def test_neighbours_cancel_and_the_way_back_is_the_inverse(
     assert robot.certificate().verified
 
 
-def test_it_is_the_chains_placement() -> None:
+def test_a_relative_placement_equals_the_placement_of_the_chain() -> None:
     robot = urdfkin.load("panda")
     q = robot.sample(6, seed=2)
     path = robot.chain("panda_leftfinger", "panda_link3")
@@ -323,7 +323,7 @@ def test_it_is_the_chains_placement() -> None:
     np.testing.assert_allclose(T, path.placement(robot.select(path, q)), atol=1e-14)
 
 
-def test_several_frames_batches_and_a_given_array_are_as_in_placement() -> None:
+def test_relative_placement_accepts_frames_batches_and_out_as_placement_does() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(6, seed=3).reshape(2, 3, 6)
     out = np.empty((2, 3, 2, 4, 4))
@@ -336,7 +336,7 @@ def test_several_frames_batches_and_a_given_array_are_as_in_placement() -> None:
 
 
 @pytest.mark.parametrize("slip", [1e-12, "transposed", "in the world's axes"])
-def test_a_slip_in_it_is_a_disagreement_with_a_line_that_shows_it(
+def test_an_error_in_a_relative_placement_is_found_and_reproducible(
     slip: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     face: Any = bodies

@@ -1,4 +1,4 @@
-"""An accelerometer feels all but gravity, a gyroscope turns with what it sits on: by laws, and by MuJoCo."""
+"""An IMU measures acceleration minus gravity, and angular velocity: by laws, and by MuJoCo."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def moving_base(n: int, seed: int) -> BaseMotion:
 
 @pytest.mark.parametrize("base", [None, moving_base(7, 1)])
 @pytest.mark.parametrize("name", NAMES)
-def test_it_reads_acceleration_less_gravity_and_angular_velocity_in_its_own_axes(
+def test_an_imu_measures_acceleration_minus_gravity_and_angular_velocity_in_its_axes(
     name: str, base: BaseMotion | None
 ) -> None:
     robot = robot_of(name)
@@ -53,7 +53,7 @@ def test_it_reads_acceleration_less_gravity_and_angular_velocity_in_its_own_axes
     assert np.abs(in_world - expected).max() < 2000.0 * EPS * max(1.0, np.abs(expected).max())
 
 
-def test_at_rest_it_reads_gravity_upwards_and_in_free_fall_nothing() -> None:
+def test_an_imu_measures_gravity_at_rest_and_zero_in_free_fall() -> None:
     robot = urdfkin.load("panda")
     q, still = robot.sample(5), np.zeros(robot.nv)
     at_rest = robot.imu(q, still, still, "panda_hand")
@@ -65,7 +65,7 @@ def test_at_rest_it_reads_gravity_upwards_and_in_free_fall_nothing() -> None:
 
 
 @pytest.mark.parametrize("slip", ["sign", "spatial", "none"])
-def test_gravity_the_wrong_way_or_the_spatial_acceleration_is_found(
+def test_an_imu_with_reversed_gravity_or_spatial_acceleration_is_found(
     slip: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot, original = urdfkin.load("ur5"), evaluate.imus
@@ -103,7 +103,7 @@ def test_gravity_is_one_vector_of_finite_numbers() -> None:
 
 
 @pytest.mark.parametrize("afloat", [False, True])
-def test_mujocos_sensors_read_the_same(afloat: bool) -> None:
+def test_the_sensors_of_mujoco_measure_the_same(afloat: bool) -> None:
     mujoco = pytest.importorskip("mujoco")
     spec = mujoco.MjSpec.from_string(WITH_MASSES)
     spec.option.gravity = G

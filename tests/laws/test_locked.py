@@ -124,7 +124,8 @@ def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: str) -> None:
 @pytest.mark.parametrize("name", ["panda", "a1"])
 def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> None:
     locked = robot_of(name).locked(joints=lockable(robot_of(name))[:2], lock="ready")
-    base = urdfkin.BaseMotion(pose(p=[1.0, 2.0, 3.0]), [1.0, 0, 0, 0, 0, 2.0], [0, 1.0, 0, 3.0, 0, 0])
+    rates = np.array([[1.0, 0, 0, 0, 0, 2.0], [0, 1.0, 0, 3.0, 0, 0]])
+    base = urdfkin.BaseMotion(pose(p=[1.0, 2.0, 3.0]), *rates)
     q, v, a = state(locked, 2, 4)
     locked.acceleration(q, v, a, locked.link_frames, base=base, verify=True)
     assert locked.certificate().verified
@@ -272,7 +273,7 @@ def test_a_locked_robot_is_the_same_as_its_text_with_fixed_joints() -> None:
     assert not urdfkin.same(locked, whole.locked({"wrist_1_joint": 0.6, "shoulder_pan_joint": -1.0}))
 
 
-def test_every_other_result_works_on_a_locked_robot() -> None:
+def test_all_other_results_exist_for_a_locked_robot() -> None:
     panda = urdfkin.load("panda").locked({"panda_finger_joint1": 0.04, "panda_joint3": 0.3})
     frame, q = "panda_hand_tcp", panda.poses["ready"]
     T = panda.placement(q, frame)
@@ -355,7 +356,7 @@ def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() ->
         ({"joints": ["panda_finger_joint2"]}, "it mimics panda_finger_joint1"),
     ],
 )
-def test_a_lock_or_joints_that_make_no_sense_are_one_clear_error(options: dict[str, Any], words: str) -> None:
+def test_an_invalid_lock_raises_an_error(options: dict[str, Any], words: str) -> None:
     for lock in (lambda: urdfkin.load("panda", **options), lambda: urdfkin.load("panda").locked(**options)):
         with pytest.raises(urdfkin.UrdfkinError, match=re.escape(words)):
             lock()

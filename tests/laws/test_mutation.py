@@ -1,4 +1,4 @@
-"""The bound is tight: an equation's term that is off by 1e-10 is caught, and so is the URDF's 12th digit."""
+"""The bounds are tight: they catch an error of 1e-10 in a term and a wrong 12th digit of a URDF."""
 
 import ast
 import inspect
@@ -94,7 +94,7 @@ def robot_that_misreads(text: str, wrong: str) -> Robot:
 
 
 @pytest.mark.parametrize("place", ["0.333", "-1.5707963267948966", "0.0825", "0.384"])
-def test_a_number_that_was_misread_in_its_12th_digit_is_caught(place: str) -> None:
+def test_a_number_with_a_wrong_12th_digit_is_caught(place: str) -> None:
     text = urdfkin.load("panda").urdf
     found = present(re.search(rf'(?:xyz|rpy)="[^"]*{re.escape(place)}[^"]*"', text))
     exponent = int(np.floor(np.log10(abs(float(place)))))
@@ -117,7 +117,7 @@ def test_a_number_that_was_misread_in_its_12th_digit_is_caught(place: str) -> No
         ('"panda_finger_joint1"/>', '"panda_finger_joint1" offset="1e-12"/>', "panda_rightfinger"),
     ],
 )  # fmt: skip
-def test_an_axis_and_a_mimic_rule_that_were_misread_are_caught(before: str, after: str, frame: str) -> None:
+def test_a_wrong_axis_or_mimic_rule_is_caught(before: str, after: str, frame: str) -> None:
     text = urdfkin.load("panda").urdf
     spelled = next(
         way for way in (before, before.replace("/>", " />"), before.replace(" />", "/>")) if way in text

@@ -1,4 +1,4 @@
-"""A chain is the same motion as the tree's, whichever way the path runs."""
+"""A chain has the same motion as the tree, for a path in any direction."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_a_chain_and_its_reverse_undo_each_other(tree: KinematicTree) -> None:
     assert np.abs(T_there @ T_back - np.eye(4)).max() <= 20 * (1 + len(tree.joints)) * EPS * scale
 
 
-def test_a_followers_leader_is_a_coordinate_wherever_it_stands(walker: KinematicTree) -> None:
+def test_a_mimicked_joint_outside_the_path_is_a_coordinate(walker: KinematicTree) -> None:
     path = chain(walker, "right_shin", "pelvis")
     assert path.joint_names == ("right_hip", "left_knee")
     assert path.coupling.values([0.1, 2.0]).tolist() == [0.1, -1.5 * 2.0 + 0.2]
@@ -99,7 +99,7 @@ def test_coordinates_can_be_given_by_name(walker: KinematicTree) -> None:
         path.placement({"left_nee": 0.4})
 
 
-def test_a_name_that_is_missing_is_said_and_never_zero_in_silence(walker: KinematicTree) -> None:
+def test_a_missing_name_raises_an_error(walker: KinematicTree) -> None:
     with pytest.raises(InputError, match=r"no value for left_hip; .*'neutral, left_knee=\.\.\.'"):
         chain(walker, "left_foot").placement({"left_knee": 0.4})
 
@@ -172,7 +172,7 @@ def test_an_origin_or_a_direction_off_by_itself_is_a_disagreement(
     assert said in str(error.value)
 
 
-# -- a path's frames and columns, from products of matrices and difference quotients -------------------------
+# -- frames and columns of a path ------------------------------------------------------------------
 
 
 A = pose(exp_rotation([0.3, -0.4, 0.5]), [0.1, 0.2, 0.3])

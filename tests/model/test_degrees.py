@@ -1,4 +1,4 @@
-"""Values that look like degrees: one rule, wherever q enters."""
+"""Each function and command warns of values that look like degrees by the same rule."""
 
 import math
 import warnings
@@ -50,7 +50,7 @@ WAYS: dict[str, Callable[[Robot], object]] = {
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_degrees_are_asked_about_wherever_q_enters(ur5: Robot, way: str) -> None:
+def test_each_function_warns_of_degrees(ur5: Robot, way: str) -> None:
     with pytest.warns(urdfkin.DegreesWarning, match=r"90 is outside .*; degrees\? write -?90deg") as caught:
         WAYS[way](ur5)
     assert caught[0].filename == __file__
@@ -88,7 +88,7 @@ def test_lengths_and_joints_without_limits_cause_no_warning() -> None:
     robot.placement([300.0, 30.0])
 
 
-def test_all_configurations_of_a_batch_in_degrees_need_only_some_looks(ur5: Robot) -> None:
+def test_only_some_configurations_of_a_batch_are_checked_for_degrees(ur5: Robot) -> None:
     looked = list[int]()
 
     class Counted(np.ndarray):
@@ -102,7 +102,7 @@ def test_all_configurations_of_a_batch_in_degrees_need_only_some_looks(ur5: Robo
     assert looked[0] <= 16 * 6
 
 
-def test_a_batch_in_radians_is_not_copied_and_hardly_read(ur5: Robot) -> None:
+def test_a_batch_in_radians_gets_no_hint(ur5: Robot) -> None:
     q = ur5.sample(200_000)
     assert degrees_lines(ur5.tree, q) == []
     assert degrees_lines(ur5.tree, q[::2, ::-1]) == []

@@ -1,4 +1,4 @@
-"""q, v and a as people give them: each way of writing means the same numbers, or is refused."""
+"""q, v and a as text, mappings and tables: each notation gives the same numbers or an error."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def q_of(robot: Robot, text: Any) -> list[float]:
     ],
     ids=str,
 )  # fmt: skip
-def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: Robot) -> None:
+def test_each_notation_gives_the_same_bits(text: Any, arm: Robot) -> None:
     assert q_of(arm, text) == Q
     np.testing.assert_array_equal(arm.jacobian(text, "e"), arm.jacobian(Q, "e"))
 
@@ -83,7 +83,7 @@ def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: 
         ({"lift": None, "shoulder": 0, "elbow": 0}, "q, lift must be real numbers: found None"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_meant_is_refused_with_place_and_remedy(text: Any, message: str, arm: Robot) -> None:
+def test_an_invalid_value_is_refused_with_place_and_remedy(text: Any, message: str, arm: Robot) -> None:
     with pytest.raises(UrdfkinError) as error:
         arm.placement(text, "e")
     assert message in str(error.value)
@@ -96,7 +96,7 @@ def test_a_mapping_may_hold_batches_which_broadcast(arm: Robot) -> None:
     np.testing.assert_array_equal(found, arm.placement(q, "e"))
 
 
-def test_rates_take_their_unit_with_the_seconds_or_without(arm: Robot) -> None:
+def test_units_of_rates_are_accepted_with_and_without_seconds(arm: Robot) -> None:
     v, a = [0.0, math.pi / 6, 0.1], [0.0, 0.0, math.pi]
     for rate, second in (("30deg/s", "180 deg/s^2"), ("30deg", "pi rad/s²")):
         written = f"neutral,shoulder={rate},elbow=0.1", f"neutral,elbow={second}"
@@ -106,7 +106,7 @@ def test_rates_take_their_unit_with_the_seconds_or_without(arm: Robot) -> None:
         arm.velocity("ready", "neutral,elbow=1 rad/s^2", "e")
 
 
-def test_what_looks_like_degrees_is_asked_about_where_the_limits_allow_it(arm: Robot) -> None:
+def test_values_that_look_like_degrees_get_a_hint(arm: Robot) -> None:
     def of_shoulder(value: float) -> str:
         return next((line for line in arm.limit_violations([0.0, value, 1.0]) if "shoulder" in line), "")
 
@@ -118,13 +118,13 @@ def test_what_looks_like_degrees_is_asked_about_where_the_limits_allow_it(arm: R
     assert "degrees" not in " ".join(arm.limit_violations([30.0, 0.0, 1.0])), "metres"
 
 
-def test_ready_lies_within_the_limits_of_followers_too(arm: Robot) -> None:
+def test_ready_is_within_the_limits_of_mimic_joints(arm: Robot) -> None:
     assert arm.limit_violations("neutral") != []
     assert arm.limit_violations("ready") == []
     assert arm.poses["ready"].tolist() == [0.0, 0.0, pytest.approx((0.5 + 1.25) / 2)]
 
 
-def test_the_numbers_of_a_joint_with_several_go_by_name_or_together() -> None:
+def test_several_coordinates_of_a_joint_are_given_by_name_or_together() -> None:
     robot = urdfkin.load(ARM, root_joint="floating", verify=False)
     place = [0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 0.0]
     q = robot.neutral()
@@ -138,7 +138,7 @@ def test_the_numbers_of_a_joint_with_several_go_by_name_or_together() -> None:
         robot.placement({**together, "root_joint": place[:3]}, "e")
 
 
-def test_a_q_of_pinocchios_length_is_told_what_makes_it_one_of_ours() -> None:
+def test_the_error_for_a_q_of_pinocchios_length_names_the_conversion() -> None:
     with pytest.warns(urdfkin.UrdfWarning, match="URDF"):
         robot = urdfkin.load(ARM.replace('"revolute"', '"continuous"'), verify=False)
     for length, word in ((5, "mimic=True"), (7, "mimic=False")):
@@ -152,7 +152,7 @@ def test_a_q_of_pinocchios_length_is_told_what_makes_it_one_of_ours() -> None:
         robot.from_pinocchio(np.zeros(5))
 
 
-def test_a_prepared_frame_and_a_table_take_them_too(arm: Robot) -> None:
+def test_prepared_frames_and_dh_tables_accept_text(arm: Robot) -> None:
     text = "lift=5mm, shoulder=30deg, elbow=pi/2"
     fast = arm.prepare("e")
     for _ in range(2):  # before a kernel was made, and after
@@ -166,7 +166,7 @@ def test_a_prepared_frame_and_a_table_take_them_too(arm: Robot) -> None:
         table.placement("lift=5deg, shoulder=0, elbow=0")
 
 
-def test_no_moving_joint_takes_no_number() -> None:
+def test_a_robot_without_moving_joints_accepts_empty_input() -> None:
     robot = urdfkin.load(urdf_of("fixed_only"), verify=False)
     nothings: list[Any] = ["", "[]", "neutral", "ready", {}]
     for nothing in nothings:
@@ -187,7 +187,7 @@ def test_a_printed_number_is_read_back_in_its_unit(value: float, unit: str) -> N
 @pytest.mark.slow
 @given(st.text(max_size=30) | st.from_regex(r"[0-9.eEpi*/+ deg°πms^-]{0,30}", fullmatch=True))
 @settings(max_examples=400)
-def test_any_text_is_finite_numbers_or_an_error_of_our_own(text: str) -> None:
+def test_any_text_gives_finite_numbers_or_a_urdfkin_error(text: str) -> None:
     found = parse_quantity(text)
     assert found is None or math.isfinite(found.value)
     robot = urdfkin.load("one_link", verify=False)
@@ -237,7 +237,7 @@ class Columns:
 SHUFFLED = ["elbow", "lift", "shoulder"]
 
 
-def test_a_series_is_read_by_its_labels_in_whatever_order(arm: Robot) -> None:
+def test_a_series_is_read_by_its_labels_in_any_order(arm: Robot) -> None:
     named = Series([1.25, 0.1, -0.5], SHUFFLED)
     expected = arm.jacobian([0.1, -0.5, 1.25], "e")
     np.testing.assert_array_equal(arm.jacobian(named, "e"), expected)
@@ -257,7 +257,7 @@ def test_a_data_frame_is_a_batch_whose_columns_have_names(kind: Any, arm: Robot)
     np.testing.assert_array_equal(found, arm.placement(q, "e"))
 
 
-def test_labels_that_only_count_stand_for_the_order(arm: Robot) -> None:
+def test_labels_0_1_2_mean_the_order_of_the_coordinates(arm: Robot) -> None:
     expected = arm.placement([0.1, -0.5, 1.25], "e")
     np.testing.assert_array_equal(arm.placement(Series([0.1, -0.5, 1.25], range(3)), "e"), expected)
     np.testing.assert_array_equal(arm.placement(DataFrame([[0.1, -0.5, 1.25]], range(3)), "e")[0], expected)
@@ -272,7 +272,7 @@ def test_labels_that_only_count_stand_for_the_order(arm: Robot) -> None:
     ],
     ids=["numbers in another order", "a label twice", "a list of them"],
 )
-def test_labels_that_cannot_be_meant_are_refused(given: Any, message: str, arm: Robot) -> None:
+def test_invalid_labels_are_refused(given: Any, message: str, arm: Robot) -> None:
     with pytest.raises(InputError) as caught:
         arm.placement(given, "e")
     assert message in str(caught.value)
@@ -286,7 +286,7 @@ ALIKE = urdfs.robot(
 )
 
 
-def test_no_name_stands_for_two_coordinates() -> None:
+def test_coordinate_names_are_unique() -> None:
     robot = urdfkin.load(ALIKE)
     assert robot.coordinate_names == ("a:x", "a:y", "a:angle", "a.x")
     assert robot.rate_names == ("a.vx", "a.vy", "a.wz", "a.x")
@@ -300,12 +300,12 @@ def test_no_name_stands_for_two_coordinates() -> None:
         robot.placement({"a.x": 0.5, "a.y": 1.0, "a.angle": 0.0}, "s")
 
 
-def test_a_joint_called_as_the_other_spelling_gets_another_one_still() -> None:
+def test_a_third_separator_avoids_a_third_equal_name() -> None:
     text = ALIKE.replace("</robot>", f'<link name="t"/>{joint("a:y", "fixed", "s", "t", axis="")}</robot>')
     assert urdfkin.load(text).coordinate_names == ("a::x", "a::y", "a::angle", "a.x")
 
 
-def test_names_that_stand_for_two_numbers_never_set_one_of_them_to_zero() -> None:
+def test_equal_names_never_set_a_coordinate_to_zero() -> None:
     twice = CoordinateLayout("q", ("a", "a"), ("rad", "rad"))
     with pytest.raises(InputError, match="no value for a"):
         twice.read({"a": 0.5})
@@ -340,7 +340,7 @@ def test_a_name_read_as_another_coordinate_disagrees(given: str, monkeypatch: py
 
 
 @pytest.mark.parametrize("root_joint", ["planar", "floating"])
-def test_so_is_one_of_the_numbers_of_a_joint_that_has_several(
+def test_an_exchanged_number_of_a_joint_with_several_disagrees(
     root_joint: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = urdfkin.load(ARM, root_joint=root_joint)
@@ -360,7 +360,7 @@ def test_so_is_one_of_the_numbers_of_a_joint_that_has_several(
         robot.velocity(robot.neutral(), v, "e")
 
 
-def test_names_that_are_hard_to_tell_from_the_text_around_are_found_by_both() -> None:
+def test_names_with_special_characters_are_found_by_both() -> None:
     hard = {"lift": "a=b", "shoulder": "a", "elbow": "b (left).x"}
     text = ARM
     for name, other in hard.items():

@@ -1,4 +1,4 @@
-"""The tree keeps Pinocchio's order; poses, steps and configurations of its joints."""
+"""The order of a tree, distances of poses, integration, limits, and Pinocchio's layout."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ def hand() -> KinematicTree:
     return build_tree("hand", "palm", rows)
 
 
-def test_joints_stand_depth_first_and_siblings_by_name(hand: KinematicTree) -> None:
+def test_joints_are_ordered_depth_first_and_siblings_by_name(hand: KinematicTree) -> None:
     assert [j.name for j in hand.joints] == ["finger", "tip", "mount", "thumb"]
     assert hand.links == ("palm", "finger_link", "tip_link", "nail", "thumb_link")
     assert [j.parent for j in hand.joints] == [0, 1, 2, 0]
 
 
-def test_a_follower_has_no_coordinate_and_points_at_its_leaders(hand: KinematicTree) -> None:
+def test_a_mimic_joint_has_the_index_of_the_mimicked_joint(hand: KinematicTree) -> None:
     assert (hand.nq, hand.nv) == (2, 2)
     assert hand.q_index[hand.joint_index("tip")] == hand.q_index[hand.joint_index("finger")] == 0
     assert hand.q_index[hand.joint_index("thumb")] == 1
@@ -67,7 +67,7 @@ def test_the_path_leads_from_the_root_outwards(hand: KinematicTree) -> None:
     assert [hand.links[i] for i in hand.leaves()] == ["nail", "thumb_link"]
 
 
-def test_a_root_joint_hangs_the_robot_from_the_universe(hand: KinematicTree) -> None:
+def test_a_root_joint_connects_the_robot_to_the_universe(hand: KinematicTree) -> None:
     free = with_root_joint(hand, JointKind.FLOATING)
     assert (free.nq, free.nv) == (9, 8)
     assert free.links[:2] == ("universe", "palm")
@@ -76,14 +76,14 @@ def test_a_root_joint_hangs_the_robot_from_the_universe(hand: KinematicTree) -> 
         with_root_joint(free, JointKind.PLANAR)
 
 
-def test_a_loop_or_an_island_is_refused() -> None:
+def test_a_loop_or_a_disconnected_link_is_refused() -> None:
     with pytest.raises(InputError, match="cannot be reached"):
         build_tree("r", "a", [(joint("x"), "b", "c")])
     with pytest.raises(InputError, match="loop"):
         build_tree("r", "a", [(joint("x"), "a", "b"), (joint("y"), "b", "a")])
 
 
-def test_a_follower_of_a_follower_is_refused() -> None:
+def test_a_mimic_joint_of_a_mimic_joint_is_refused() -> None:
     first, second = joint("b", mimic=Mimic("a", 1.0, 0.0)), joint("c", mimic=Mimic("b", 1.0, 0.0))
     with pytest.raises(InputError, match="mimic only an independent joint"):
         build_tree("r", "l0", [(joint("a"), "l0", "l1"), (first, "l1", "l2"), (second, "l2", "l3")])
@@ -96,19 +96,19 @@ def test_arrays_are_read_only_before_and_after_pickling(hand: KinematicTree) -> 
 
 
 @pytest.mark.slow
-def test_a_chain_of_50000_links_needs_no_deep_stack() -> None:
+def test_a_chain_of_50000_links_needs_no_recursion() -> None:
     chain = [(joint(f"j{i}"), f"l{i}", f"l{i + 1}") for i in range(50_000)]
     tree = build_tree("long", "l0", chain)
     assert tree.nq == 50_000
     assert len(tree.path(50_000)) == 50_000
 
 
-# -- how far two poses are apart: the angle and the way, about every axis ------------------------------------
+# -- distance of two poses -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.3, math.pi / 2, 3.0, -3.0])
-def test_poses_are_apart_by_the_angle_and_the_way_that_one_was_moved(axis: str, angle: float) -> None:
+def test_the_distance_of_poses_is_the_angle_and_the_displacement(axis: str, angle: float) -> None:
     T = shift(0.1, -0.2, 0.3) @ rotation("y", 0.7) @ rotation("x", -1.1)
     moved = T @ rotation(axis, angle)
     moved[:3, 3] += [2.0, 3.0, 6.0]
@@ -119,11 +119,11 @@ def test_poses_are_apart_by_the_angle_and_the_way_that_one_was_moved(axis: str, 
     assert np.allclose(pose_difference(T, T), 0.0, atol=1e-15)
 
 
-# -- `integrate` and `difference`: Pinocchio's, and each undoes the other ------------------------------------
+# -- `integrate` and `difference` -------------------------------------------------------------------
 
 
 EPS = np.finfo(float).eps
-#: A robot without followers for each kind of joint: continuous ones, and what it hangs from.
+#: A robot without mimic joints for each kind of root joint.
 SUBJECTS = [("kinova", None), ("a1", "floating"), ("a1", "planar")]
 
 
@@ -164,7 +164,7 @@ def same_pose(ours: FloatArray, theirs: FloatArray) -> float:
 
 
 @pytest.mark.parametrize(("name", "root"), SUBJECTS)
-def test_small_steps_at_constant_rates_are_one_large_one(name: str, root: str | None) -> None:
+def test_small_steps_at_constant_rates_add_up_to_a_large_step(name: str, root: str | None) -> None:
     robot, _ = both(name, root)
     q, v = robot.sample(5, seed=1), np.random.default_rng(2).uniform(-1.0, 1.0, (5, robot.nv))
     walked = q
@@ -190,7 +190,7 @@ def test_batches_broadcast_or_are_refused() -> None:
         robot.integrate(q, np.ones((3, robot.nv)))
 
 
-def test_a_wheel_counts_its_turns_and_goes_back_the_shortest_way() -> None:
+def test_integrate_counts_turns_and_difference_takes_the_shortest_way() -> None:
     robot, _ = both("kinova", None)
     wheel = robot.coordinate_names.index("j2s6s200_joint_1")
     turned = robot.integrate("neutral", "neutral, j2s6s200_joint_1=350deg/s")
@@ -198,7 +198,7 @@ def test_a_wheel_counts_its_turns_and_goes_back_the_shortest_way() -> None:
     assert robot.difference("neutral", turned)[wheel] == pytest.approx(np.radians(-10.0))
 
 
-# -- which values of a joint are outside its bounds, and what Pinocchio's layout may hold --------------------
+# -- limits, and the layout of Pinocchio -----------------------------------------------------------
 
 
 LOWER, UPPER = -0.7, 1.3
@@ -213,31 +213,31 @@ def two_joints(mimic: Mimic | None = None) -> KinematicTree:
 @pytest.mark.parametrize(
     "a", [LOWER, 0.0, UPPER, math.nextafter(LOWER, -1.0), math.nextafter(UPPER, 2.0)], ids=str
 )
-def test_a_bound_is_within_itself_and_so_is_its_neighbour(a: float) -> None:
+def test_a_limit_and_its_neighbouring_number_are_within_the_limit(a: float) -> None:
     assert limit_violations(two_joints(), np.array([a, 0.05])) == []
 
 
 @pytest.mark.parametrize("beyond", [1e-12, 1e-6, 1e-3, 1.0])
 @pytest.mark.parametrize(("bound", "sign"), [(LOWER, -1.0), (UPPER, 1.0)])
-def test_however_little_a_joint_is_outside_it_is_said(bound: float, sign: float, beyond: float) -> None:
+def test_a_joint_slightly_outside_its_limits_is_reported(bound: float, sign: float, beyond: float) -> None:
     q = np.array([[0.0, 0.05], [bound + sign * beyond, 0.05], [0.1, 0.05]])
     (line,) = limit_violations(two_joints(), q)
     assert line == f"joint a: {bound + sign * beyond:.6g} is outside [-0.7, 1.3]"
 
 
-def test_the_worst_value_of_a_batch_is_told_for_each_joint() -> None:
+def test_the_worst_value_of_a_batch_is_reported_for_each_joint() -> None:
     q = np.array([[[1.4, -0.2], [1.9, 0.0]], [[-0.8, 0.3], [0.0, 0.05]]])
     said = ["joint a: 1.9 is outside [-0.7, 1.3]", "joint b: -0.2 is outside [0, 0.1]"]
     assert limit_violations(two_joints(), q) == said
 
 
 @pytest.mark.parametrize(("a", "b"), [(0.15, None), (0.21, "0.11"), (-0.01, None), (-0.02, "-0.005")])
-def test_a_follower_is_held_to_its_own_bounds(a: float, b: str | None) -> None:
+def test_the_limits_of_a_mimic_joint_apply_to_its_own_value(a: float, b: str | None) -> None:
     found = limit_violations(two_joints(Mimic("a", 0.5, 0.005)), np.array([a]))
     assert found == ([] if b is None else [f"joint b: {b} is outside [0, 0.1]"])
 
 
-def test_a_joint_without_bounds_and_a_batch_without_rows_are_never_outside() -> None:
+def test_joints_without_limits_and_empty_batches_have_no_violations() -> None:
     tree = build_tree("free", "l0", [(joint("c", kind=JointKind.CONTINUOUS), "l0", "l1")])
     assert limit_violations(tree, np.array([1e9])) == []
     assert limit_violations(two_joints(), np.empty((0, 2))) == []
@@ -254,7 +254,7 @@ def with_everything() -> KinematicTree:
 
 
 @pytest.mark.parametrize("mimic", [True, False])
-def test_pinocchios_layout_leads_back(mimic: bool) -> None:
+def test_from_pinocchio_inverts_to_pinocchio(mimic: bool) -> None:
     tree = with_everything()
     q = np.random.default_rng(2).uniform(-3.0, 3.0, (2, 5, 4))
     there = to_pinocchio(tree, q, mimic=mimic)
@@ -264,7 +264,7 @@ def test_pinocchios_layout_leads_back(mimic: bool) -> None:
 
 @pytest.mark.parametrize("turns", [0, 1, -3])
 @pytest.mark.parametrize("angle", [-math.pi, math.pi, np.nextafter(-math.pi, 0.0), 3.0, -0.0])
-def test_an_angle_comes_back_in_one_turn_whose_two_ends_are_in_it(angle: float, turns: int) -> None:
+def test_from_pinocchio_returns_angles_in_plus_minus_pi(angle: float, turns: int) -> None:
     tree = with_everything()
     there = to_pinocchio(tree, np.full(4, angle + turns * math.tau), mimic=True)
     found = from_pinocchio(tree, there, mimic=True)[[0, 3]]  # the wheel's, and the planar joint's
@@ -276,7 +276,9 @@ def test_an_angle_comes_back_in_one_turn_whose_two_ends_are_in_it(angle: float, 
 
 @pytest.mark.parametrize(("off", "refused"), [(1e-12, False), (1e-8, True), (-1e-3, True), (0.5, True)])
 @pytest.mark.parametrize("name", ["slide", "gear"])
-def test_a_follower_that_does_not_follow_is_refused(name: str, off: float, refused: bool) -> None:
+def test_from_pinocchio_refuses_a_mimic_joint_that_violates_its_rule(
+    name: str, off: float, refused: bool
+) -> None:
     tree = with_everything()
     q = np.array([[0.2, 0.0, 0.0, 0.0], [0.4, 1.0, 2.0, 3.0]])
     there = to_pinocchio(tree, q)
@@ -293,7 +295,7 @@ def test_a_follower_that_does_not_follow_is_refused(name: str, off: float, refus
 
 
 @pytest.mark.parametrize("at", [0, 4])
-def test_a_pair_that_is_no_cosine_and_sine_is_refused(at: int) -> None:
+def test_from_pinocchio_refuses_an_invalid_cosine_and_sine(at: int) -> None:
     tree = with_everything()
     there = to_pinocchio(tree, np.array([0.2, 0.5, -0.5, 1.0]), mimic=True)
     there[at : at + 2] *= 1.0 + 2e-6

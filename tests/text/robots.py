@@ -1,4 +1,4 @@
-"""The text's robots twice: as URDFs through urdfkin, and as Denavit-Hartenberg rows at 60 digits."""
+"""The robots of the textbook, as URDFs in urdfkin and as Denavit-Hartenberg tables at 60 digits."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_7_114_the_jacobian_with_the_shortened_moment_arms_is_the_same() -> None
     assert close(jacobian(), J)
 
 
-# -- what the substitution saves ---------------------------------------------------------------------
+# -- operations that the substitution saves --------------------------------------------------------
 
 
 class Counted:

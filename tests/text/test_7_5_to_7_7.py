@@ -98,7 +98,7 @@ def test_7_122_fails_where_omega_cannot_be_inverted_and_a_quaternion_does_not() 
     assert robot("elbow").analytical_jacobian(np.zeros(6), "wrist", "quaternion").shape == (7, 6)
 
 
-# -- section 7.6: the acceleration of points, equations 7.123 to 7.125 and example 7.4 -----------------------
+# -- section 7.6: acceleration of points, equations 7.123 to 7.125, example 7.4 --------------------
 
 
 def moving(t: Any) -> Any:
@@ -150,7 +150,7 @@ def test_example_7_4_motion_in_the_plane_points_inwards_and_along_the_tangent() 
     assert agree(parts.transverse, rate_rate * rotation_about(z, theta + np.pi / 2) @ p_1)
 
 
-# -- section 7.7: accelerations of the text's robots, equations 7.126 to 7.130, and a moving base ------------
+# -- section 7.7: accelerations of robots, equations 7.126 to 7.130 --------------------------------
 
 
 ELBOW, POLAR, PLANAR = motion("elbow", 8), motion("polar", 9), motion("planar_two_link", 10)

@@ -1,4 +1,4 @@
-"""docs/equations.md is complete, current and true; its LaTeX, and the misprints of the chapter."""
+"""docs/equations.md is complete, current and correct; its LaTeX, and the misprints of the chapter."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def test_explain_gives_a_page_for_each_equation_and_says_which_are_lost() -> Non
     assert explain("7.131") is explain("URDF101") is explain("7") is None
 
 
-# -- the LaTeX of each equation says what its plain statement says, symbol by symbol -------------------------
+# -- LaTeX and plain text of each equation have the same symbols -----------------------------------
 
 
 _WORDS = {r"\times": "x", r"\cdot": ".", r"\ldots": "...", r"\omega": "w", r"\left": "", r"\right": ""}
@@ -173,7 +173,7 @@ def test_a_lost_sign_or_dot_is_seen() -> None:
         assert of_latex(equation.latex.replace(*slip, 1)) != of_statement(equation.statement)
 
 
-# -- misprints of the chapter, each proved: what is printed does not hold, what is meant does ----------------
+# -- misprints of the chapter: the printed equation is wrong, the corrected one holds --------------
 
 
 def test_omega_zyz_is_singular_at_pi_as_well_as_at_zero() -> None:

@@ -56,8 +56,8 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
 from urdfkin.errors.validators import as_str
-from urdfkin.kinematics import equations
 from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, unit_vectors, vectors
+from urdfkin.kinematics.number_kinds import array_equations as eq
 
 
 def skew(w: ArrayLike) -> FloatArray:
@@ -222,7 +222,7 @@ def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
 
 def rotation_of(quat: ArrayLike) -> FloatArray:
     """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion."""
-    rows = equations.rotation_of_quaternion(*np.moveaxis(unit_quaternions(quat), -1, 0))
+    rows = eq.rotation_of_quaternion(*np.moveaxis(unit_quaternions(quat), -1, 0))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 

@@ -49,7 +49,7 @@ def test_a_row_of_frames_moves_as_the_product_of_its_transformations() -> None:
         assert np.abs(found - array(exact)).max() <= room * ROUNDING
 
 
-def test_no_frames_at_all_are_frame_zero() -> None:
+def test_an_empty_list_of_frames_gives_frame_zero() -> None:
     still = compose_all([])
     assert np.array_equal(still.R_0_1, np.eye(3))
     assert not still.d_0_1.any()
@@ -65,7 +65,7 @@ def test_batches_of_frames_and_points_broadcast() -> None:
     assert np.array_equal(parts.total[2, 1], single.total)
 
 
-def test_a_frame_refuses_what_is_no_rotation_and_keeps_its_arrays_to_itself() -> None:
+def test_a_frame_refuses_an_invalid_rotation_and_copies_its_arrays() -> None:
     with pytest.raises(InputError, match="R_0_1 must be a rotation"):
         MovingFrame(2.0 * np.eye(3), np.zeros(3))
     origin = np.zeros(3)
@@ -130,7 +130,7 @@ def test_at_the_singularity_the_jacobian_is_refused_with_the_distance() -> None:
         assert np.isfinite(velocity_jacobian(sequence, singular, np.ones((6, 3)))).all()
 
 
-def test_how_near_is_too_near_is_the_callers_choice() -> None:
+def test_the_caller_chooses_the_least_distance_to_a_singularity() -> None:
     near = rotation_from_euler("ZYZ", [0.3, 1e-4, 0.0])
     assert np.isfinite(analytical_jacobian("ZYZ", near, np.ones((6, 3)))).all()
     with pytest.raises(RepresentationSingularityError):
@@ -144,7 +144,7 @@ def test_unknown_representations_and_shapes_are_refused() -> None:
         analytical_jacobian("ZYZ", R, np.ones((5, 3)))
 
 
-def test_velocities_are_referred_to_the_tool_and_back() -> None:
+def test_velocities_are_converted_to_the_tool_and_back() -> None:
     generator = np.random.default_rng(2)
     velocity, d = generator.normal(size=(5, 6)), generator.normal(size=(5, 3))
     there = tool_velocity(velocity, d)

@@ -1,4 +1,4 @@
-"""Hypothesis strategies for geometry: unit vectors, angles at the awkward places, rotations."""
+"""Hypothesis strategies for unit vectors, special angles and rotations."""
 
 from __future__ import annotations
 

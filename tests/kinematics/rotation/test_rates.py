@@ -43,7 +43,7 @@ def test_a_batch_of_rows_adds_up_row_by_row_and_no_frame_gives_nothing() -> None
     assert add_angular_velocities(np.zeros((0, 3, 3)), np.zeros((0, 3))).tolist() == [0.0, 0.0, 0.0]
 
 
-# -- euler rates against derivatives at 60 digits, and their singularity, said and measured ------------------
+# -- Euler rates and their singularity -------------------------------------------------------------
 
 
 ANGLES, RATES = np.array([0.4, 1.3, -2.1]), np.array([0.7, -1.1, 2.3])
@@ -126,7 +126,7 @@ def test_the_distance_is_zero_where_and_only_where_the_determinant_is(middle: fl
         assert abs(float(np.sin(singularity_distance(name, turns))) - determinant) <= ROUNDING
 
 
-# -- quaternion rates both ways and in both frames, and orientation integrated from them ---------------------
+# -- quaternion rates ------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -148,7 +148,9 @@ def test_the_columns_of_the_rate_matrix_are_perpendicular_and_half_long(k: Float
 
 @pytest.mark.slow
 @given(axes, angles, vectors3)
-def test_the_body_sees_the_fixed_frames_rates_turned(k: FloatArray, phi: float, w: FloatArray) -> None:
+def test_body_rates_are_the_rotated_rates_of_the_fixed_frame(
+    k: FloatArray, phi: float, w: FloatArray
+) -> None:
     R = rotation_about(k, phi)
     quat = quaternion_of(R)
     assert np.abs(quaternion_rates(quat, w) - quaternion_rates(quat, R.T @ w, "body")).max() <= ROUNDING

@@ -1,4 +1,4 @@
-"""Rotations: SciPy and Pinocchio agree, and each description comes back."""
+"""Rotations agree with SciPy and Pinocchio, and each representation is recovered."""
 
 from typing import Any
 
@@ -70,7 +70,7 @@ def test_log_is_pinocchios_log3_away_from_half_a_turn(axis: FloatArray) -> None:
         assert np.abs(log_rotation(R) - pin.log3(R)).max() <= 4 * ROUNDING
 
 
-def test_axis_and_angle_come_back() -> None:
+def test_axis_and_angle_of_a_rotation_are_recovered() -> None:
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
     for angle in (1e-12, 0.5, 3.0, np.pi - 1e-9):
         found, size = axis_angle_of(rotation_about(axis, angle))
@@ -78,7 +78,7 @@ def test_axis_and_angle_come_back() -> None:
         assert np.abs((found - axis) * angle).max() <= ROUNDING
 
 
-def test_no_rotation_has_the_axis_z_and_no_angle() -> None:
+def test_the_identity_has_axis_z_and_angle_zero() -> None:
     axis, angle = axis_angle_of(np.eye(3))
     assert axis.tolist() == [0.0, 0.0, 1.0]
     assert float(angle) == 0.0
@@ -108,7 +108,7 @@ def test_coordinate_axes_are_aligned_without_rounding() -> None:
     assert np.array_equal(axis_aligning([0.0, 0.0, 1.0]), np.eye(3))
 
 
-# -- three angles and a rotation, there and back, in all 24 sequences ----------------------------------------
+# -- rotations and angles in all 24 sequences ------------------------------------------------------
 
 
 three_angles = st.tuples(angles, angles, angles)
@@ -143,7 +143,7 @@ def test_angles_of_a_rotation_give_it_back_at_the_singularity_too(
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
-def test_angles_inside_the_range_come_back_themselves(name: str) -> None:
+def test_angles_within_the_range_are_recovered(name: str) -> None:
     middle = 1.1 if name[0] == name[2] else -0.7
     assert (
         np.abs(euler_of(name, rotation_from_euler(name, [0.3, middle, -2.0])) - [0.3, middle, -2.0]).max()
@@ -176,7 +176,7 @@ def test_batches_are_their_members() -> None:
     assert euler_of("zyx", np.zeros((0, 3, 3))).shape == (0, 3)
 
 
-# -- quaternions are SciPy's, scalar last, and multiply like rotations ---------------------------------------
+# -- quaternions -----------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -205,7 +205,7 @@ def test_the_conjugate_is_the_inverse(axis: FloatArray, angle: float) -> None:
     assert np.abs(multiply(quat, conjugate(quat)) - [0, 0, 0, 1]).max() <= ROUNDING
 
 
-# -- the skew matrix is the cross product, and gives its vector back -----------------------------------------
+# -- skew matrices ---------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -254,7 +254,7 @@ REFUSED: dict[str, tuple[Any, Any, str]] = {
 
 
 @pytest.mark.parametrize("given", REFUSED)
-def test_what_describes_no_rotation_is_refused(given: str) -> None:
+def test_an_invalid_rotation_is_refused(given: str) -> None:
     function, arguments, message = REFUSED[given]
     kind = UnknownNameError if given == "an unknown sequence" else InputError
     with pytest.raises(kind, match=message):

@@ -1,4 +1,4 @@
-"""Conversions of q, v, a, Jacobians and their derivatives: laws, files of a user, errors, maps of `same`."""
+"""Conversions of q, v, a and Jacobians between conventions: laws, user files, errors, maps of `same`."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_a_robot_in_a_convention_keeps_identities(dog: Robot, cart: Robot, conve
         assert np.allclose(other.placement(q, frame), robot.placement(ours[0], frame), 0, 1e-13)
 
 
-def test_several_frames_at_once_are_each_as_alone(dog: Robot) -> None:
+def test_several_frames_at_once_equal_single_frames(dog: Robot) -> None:
     other = dog.with_convention("drake")
     q, v, _ = other.conversion.to(*_values(dog))
     frames = ["FL_foot", "trunk"]
@@ -124,7 +124,7 @@ def test_several_frames_at_once_are_each_as_alone(dog: Robot) -> None:
             assert np.array_equal(together[:, k], method(*inputs, frame))
 
 
-def test_nothing_is_copied_where_nothing_differs() -> None:
+def test_equal_conventions_make_no_copy() -> None:
     arm = urdfkin.load("ur5", verify=False)
     q = arm.sample(10)
     conversion = arm.convention("mujoco")
@@ -388,7 +388,7 @@ def arm_with(rule_of_a: str = "", rule_of_b: str = "") -> Robot:
 
 
 @pytest.mark.filterwarnings("ignore:.*URDF527")
-def test_a_leader_of_one_model_may_be_a_mimic_joint_of_the_other() -> None:
+def test_a_mimicked_joint_of_one_model_may_be_a_mimic_joint_of_the_other() -> None:
     a, b = arm_with(rule_of_b=mimic("a", 2, 0.1)), arm_with(mimic("b", 0.5, -0.05))
     found = urdfkin.same(a, b, bounds=False)
     conversion = a.convention(found.convention())

@@ -89,7 +89,9 @@ def _conversion(robot: Robot, name: str, library: Library, **changes: Any) -> Co
     ("name", "robot_name"),
     [(name, OTHERS.get((name, robot), robot)) for name in LIBRARIES for robot in ROBOTS],
 )
-def test_a_librarys_own_results_in_its_convention_are_ours(name: str, robot_name: str, tmp_path: Any) -> None:
+def test_results_of_a_library_in_its_convention_equal_those_of_urdfkin(
+    name: str, robot_name: str, tmp_path: Any
+) -> None:
     robot = _loaded(robot_name, name)
     library = LIBRARIES[name](robot, tmp_path)
     conversion = _conversion(robot, name, library)

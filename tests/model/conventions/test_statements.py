@@ -1,4 +1,4 @@
-"""The conventions for which no library runs here: they agree with what their sources say."""
+"""Conventions of libraries that cannot be installed agree with published statements."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_a_planted_mistake_contradicts_them(name: str, mistake: str) -> None:
     assert _wrong(wrong)
 
 
-# -- the orders of Isaac Lab and Isaac Gym are those that other projects have published ----------------------
+# -- published joint orders of Isaac Lab and Isaac Gym ---------------------------------------------
 
 
 LEGS = ("LF", "LH", "RF", "RH")
