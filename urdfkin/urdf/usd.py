@@ -986,7 +986,7 @@ class _StageReader:
         turns = edge.kind is JointKind.REVOLUTE
         if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
-            what = f"the limits of this joint are {words}: they are probably radians"
+            what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
             what = f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m"
