@@ -329,9 +329,8 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
 def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
     """Return the prims that have each variant set, including prims inside instances."""
     sets: dict[str, list[Any]] = {}
-    for prim in pxr.Usd.PrimRange.Stage(
-        stage, pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
-    ):
+    every = pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
+    for prim in pxr.Usd.PrimRange.Stage(stage, every):
         for one in prim.GetVariantSets().GetNames():
             sets.setdefault(one, []).append(prim)
     return sets

@@ -89,10 +89,8 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
     # Codes with more findings than a reporter stores are left out.
     # After a fix, the reporter can store another of these findings, which would then look new.
     many = {finding.code for finding in before.findings if finding.also}
-    old, new = (
-        Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
-        for seen in (before, after)
-    )
+    old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
+    new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
     if appeared := new - old:
         yield f"the fix would cause {min(code for code, *_ in appeared)}"
     if sum(f.count for f in before.findings) - sum(f.count for f in after.findings) < len(fixable):
