@@ -277,7 +277,7 @@ def test_a_program_in_the_confined_process_is_refused(deed: str) -> None:
     ],
 )
 def test_the_memory_of_an_expansion_is_limited(expanded: Expand, inside: str) -> None:
-    with pytest.raises(XacroError, match="it takes more than 2 GiB of memory"):
+    with pytest.raises(XacroError, match="the expansion takes more than 2 GiB of memory"):
         expanded(inside)
 
 

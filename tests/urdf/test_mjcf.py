@@ -227,7 +227,7 @@ def test_a_file_with_the_root_element_mujoco_is_mjcf(tmp_path: Path) -> None:
     assert [is_mjcf(tmp_path / name) for name in texts] == [True, False, True, False]
     assert loaded(tmp_path / "b.xml").nq == 2
     assert not is_mjcf(tmp_path / "nothing.xml")
-    words = "this is an MJCF file; `load` and all other commands read it"
+    words = "this is an MJCF file; `load` and all other commands read files"
     with pytest.raises(urdfkin.UrdfError, match=words):
         urdfkin.load(tmp_path / "d.urdf")
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 
 from tests.reading import tree_of
-from tests.strategies import rotation, rotations, trees
+from tests.strategies import rotation, trees
 from tests.urdfs import loaded
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rpy_of
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.model.tree import Joint, JointKind, KinematicTree, Limit, build_tree
 from urdfkin.urdf.lint import Severity, check_text
 from urdfkin.urdf.reader import rpy_of_quaternion
 from urdfkin.urdf.writer import to_urdf
@@ -58,12 +58,6 @@ def test_pinocchio_agrees_on_every_written_tree(tree: KinematicTree) -> None:
 def test_a_tree_with_one_link_reads_back() -> None:
     tree = build_tree("stone", "only", [])
     assert_same(tree_of(to_urdf(tree).encode()), tree)
-
-
-@pytest.mark.slow
-@given(rotations)
-def test_roll_pitch_and_yaw_of_a_rotation_give_the_rotation(R: FloatArray) -> None:
-    np.testing.assert_allclose(rotation(*rpy_of(R)), R, rtol=0, atol=6 * EPS)
 
 
 @pytest.mark.slow

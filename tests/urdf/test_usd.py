@@ -341,9 +341,7 @@ def test_several_articulations_need_a_choice(write: Write) -> None:
         loaded(path, articulation="/arm/bas")
 
 
-def test_the_articulation_of_all_prims_has_the_name_of_the_only_root_prim_or_of_the_file(
-    write: Write,
-) -> None:
+def test_the_articulation_of_all_prims_has_the_name_of_its_root_prim_or_of_the_file(write: Write) -> None:
     text = stage(LINKS + JOINTS + joint("mount", "Fixed", "", "base") + body("stray"))
     robot = loaded(write(text), articulation="/")
     assert robot.name == "arm"
@@ -352,6 +350,15 @@ def test_the_articulation_of_all_prims_has_the_name_of_the_only_root_prim_or_of_
     assert (two.name, two.nq) == ("cell", 4)
     with pytest.raises(InputError, match="unknown articulation"):
         loaded(write(text), articulation="")
+
+
+def test_robots_with_the_same_joint_names_may_be_shown_in_different_configurations(write: Write) -> None:
+    text = stage(LINKS + JOINTS + joint("mount", "Fixed", "", "base"))
+    robot = loaded(write(text.replace("(2, 0, 1)", "(2, 0.75, 1)") + renamed(text)), articulation="/")
+    assert set(robot.joint_names) == {"shoulder", "rail", "shoulder_", "rail_"}
+    assert codes(robot) == {}
+    robot.placement(robot.neutral(), "arm_lower")
+    assert "with 1 joint not at zero" in str(robot.certificate().reading)
 
 
 def variants() -> str:

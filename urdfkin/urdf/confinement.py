@@ -49,7 +49,7 @@ class Ground:
         """Allow a file's folder, package and repository, the search paths, and paths in xacro arguments."""
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):
-            wide += [folder for folder in path.resolve().parents if _exists(folder / mark)][:1]
+            wide += _nearest_folder_with(mark, path.resolve())
         home = os.path.expanduser("~")  # noqa: PTH111  Path.home() raises an error without a home
         everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
@@ -64,13 +64,13 @@ class Ground:
         roots = self.roots
         as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
         if any(_lies_in(root, as_written) for root in self.installed):
-            roots = [*roots, *_package_of(real)]
+            roots = [*roots, *map(str, _nearest_folder_with("package.xml", Path(real)))]
         return any(_lies_in(root, real) for root in roots)
 
 
-def _package_of(path: str) -> list[str]:
-    """Return a list with the folder of a file's package; an empty list if the file is in no package."""
-    return [str(folder) for folder in Path(path).parents if _exists(folder / "package.xml")][:1]
+def _nearest_folder_with(mark: str, path: Path) -> list[Path]:
+    """Return a list with the nearest folder above a path that contains a file; an empty list if none does."""
+    return [folder for folder in path.parents if _exists(folder / mark)][:1]
 
 
 def _lies_in(root: str, path: str) -> bool:

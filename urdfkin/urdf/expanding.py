@@ -25,7 +25,7 @@ _FORBIDDEN = ("type", "vars")
 #: Expression that xacro itself evaluates, but urdfkin refuses.
 _PROBE = "${(lambda: 1)()}"
 
-_TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+_TOO_MUCH = f"the expansion takes more than {MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
@@ -99,9 +99,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
     except xacro.XacroException as error:
         if isinstance(error.exc, RefusedError):
             return
-    raise RefusedError(
-        "this version of xacro evaluates expressions in an unknown way; urdfkin does not support it"
-    )
+    raise RefusedError("this version of xacro evaluates expressions in an unknown way and is not supported")
 
 
 def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[str], str]:

@@ -105,9 +105,8 @@ class _Evaluation:
                 return owner[name]  # xacro's namespaces and YAML files are dictionaries
             except (KeyError, AttributeError):
                 raise NameError(f"{name!r} is not defined in '{ast.unparse(node.value)[:80]}'") from None
-        raise RefusedError(
-            f"the attribute {name!r} of {type(owner).__name__!r} is not allowed in expressions"
-        )
+        kind_name = type(owner).__name__
+        raise RefusedError(f"the attribute {name!r} of {kind_name!r} is not allowed in expressions")
 
     def Subscript(self, node: ast.Subscript) -> Any:
         owner = self.value(node.value)
@@ -193,9 +192,8 @@ def _bound(target: ast.expr, value: Any) -> Iterator[tuple[str, Any]]:
         for part, one in zip(target.elts, value, strict=True):
             yield from _bound(part, one)
     else:
-        raise RefusedError(
-            f"'{ast.unparse(target)[:80]}' is not a loop variable: use a name or a tuple of names"
-        )
+        text = ast.unparse(target)[:80]
+        raise RefusedError(f"'{text}' is not a loop variable: use a name or a tuple of names")
 
 
 def _rule(rules: Mapping[Any, Callable[..., Any]], node: ast.expr, op: ast.AST) -> Callable[..., Any]:

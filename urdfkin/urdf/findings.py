@@ -313,11 +313,8 @@ class UrdfError(UrdfkinError, ValueError):
         file = self.findings[0].file if self.findings else "<text>"
         total = sum(error.count for error in errors)
         count = "an error" if total == 1 else f"{total} errors"
-        super().__init__(
-            f"the URDF has {count}",
-            where=file,
-            remedy=f"run 'urdfkin explain {errors[0].code}' for details" if errors else None,
-        )
+        remedy = f"run 'urdfkin explain {errors[0].code}' for details" if errors else None
+        super().__init__(f"the URDF has {count}", where=file, remedy=remedy)
 
     def __str__(self) -> str:
         lines = [super().__str__(), *(f"  {finding}" for finding in self._errors[: self.SHOWN])]
@@ -605,9 +602,8 @@ class Reporter:
         """Return the fix that removes attributes, and the white space before each attribute."""
         existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
-        return (
-            Fix(tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)) if spans else None
-        )
+        edits = tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)
+        return Fix(edits) if edits else None
 
     def without_element(self, at: Element) -> Fix | None:
         """Return the fix that removes an empty element, and its line if the line contains nothing else."""

@@ -99,9 +99,8 @@ def urdf_of(robot: yourdf.Robot) -> str:
         records = [_record(joint) for joint in robot.joints]
         axes = {record.name: np.array(record.axis) for record in records}
         rows = [(replace(one, axis=axes[one.name]), up, down) for one, up, down in joint_rows(records)]
-        return to_urdf(
-            build_tree(robot.name, root_link(robot.name, [link.name for link in robot.links], records), rows)
-        )
+        root = root_link(robot.name, [link.name for link in robot.links], records)
+        return to_urdf(build_tree(robot.name, root, rows))
     except UrdfkinError:
         raise
     except (TypeError, ValueError, AttributeError, IndexError) as error:
@@ -209,14 +208,11 @@ class _ModelReader:
         """Convert all frames, then all moving joints. In a model, parent frames precede child frames."""
         for i in range(len(self.frames)):
             self._frame(i)
-        own = {
-            int(f.parentJoint): f for f, kind in zip(self.frames, self.kinds, strict=True) if kind == "JOINT"
-        }
+        frames = zip(self.frames, self.kinds, strict=True)
+        own = {int(frame.parentJoint): frame for frame, kind in frames if kind == "JOINT"}
         for j in range(1, int(self.model.njoints)):
-            parent = int(self.model.parents[j])
-            link, T = self._attachment(
-                own.get(j), parent, np.array(self.model.jointPlacements[j].homogeneous)
-            )
+            T = np.array(self.model.jointPlacements[j].homogeneous)
+            link, T = self._attachment(own.get(j), int(self.model.parents[j]), T)
             self.rows.append((self._joint(j, T), link, self.carriers[j]))
         tree = build_tree(str(self.model.name) or "robot", self.carriers[0], self.rows)
         joints = {link: j for j, link in self.carriers.items()}

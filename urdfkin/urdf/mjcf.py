@@ -483,15 +483,13 @@ class _MjcfReader:
         if kind == kinds.mjJNT_FREE:
             place = ", ".join(f"{x:g}" for x in m.qpos0[at : at + 3])
             if m.qpos0[at : at + 3].any() or m.qpos0[at + 3] != 1.0:
-                what = (
-                    f"qpos0 places this body at ({place}); in the neutral configuration the body is"
-                    " at the origin"
-                )
+                zero = "in the neutral configuration the body is at the origin"
+                what = f"qpos0 places this body at ({place}); {zero}"
                 self.listed.append(Listed(what, f"joint {name}"))
             return Joint(name, JointKind.FLOATING, 0, np.eye(4), np.array([1.0, 0.0, 0.0])), np.eye(4)
-        zero, turns = float(m.qpos0[at]), kind == kinds.mjJNT_HINGE
-        if zero:
-            T = T @ (pose(rotation_about(axis, -zero)) if turns else pose(p=-zero * axis))
+        reference, turns = float(m.qpos0[at]), kind == kinds.mjJNT_HINGE
+        if reference:
+            T = T @ (pose(rotation_about(axis, -reference)) if turns else pose(p=-reference * axis))
         urdf_kind, limit = self._range(j, name, turns=turns)
         return Joint(name, urdf_kind, 0, T, axis, limit), back
 
@@ -504,12 +502,8 @@ class _MjcfReader:
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
             return JointKind.CONTINUOUS, None
-        note = Listed(
-            f"a slide joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m",
-            f"joint {name}",
-        )
-        if note not in self.listed:
-            self.listed.append(note)
+        what = f"a slide joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m"
+        self.listed.append(Listed(what, f"joint {name}"))
         return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
 
     def _rules(self) -> Iterator[tuple[str, Mimic]]:

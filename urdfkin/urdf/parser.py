@@ -601,16 +601,16 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
 
 #: Remedies for files of other formats, by the tag of the root element.
 _FORMATS = {
-    "sdf": "this is an SDF file; convert it to a URDF first",
-    "mujoco": "this is an MJCF file; `load` and all other commands read it if its suffix is .xml or .mjcf",
+    "sdf": "this is an SDF file; convert the file to a URDF first",
+    "mujoco": "this is an MJCF file; `load` and all other commands read files with the suffix .xml or .mjcf",
     "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
-    "model": "this is a part of an SDF file; convert it to a URDF first",
-    "world": "this is a part of an SDF file; convert it to a URDF first",
+    "model": "this is a part of an SDF file; convert the file to a URDF first",
+    "world": "this is a part of an SDF file; convert the file to a URDF first",
     "collada": "this is a COLLADA file",
-    "html": "this is a web page, not the file it shows",
+    "html": "this is a web page, not a URDF",
     "launch": "this is a launch file; name the URDF that the launch file loads",
     "package": "this is a package manifest; the URDF is another file",
-    "drake": "this is a Drake file; convert it to a URDF first",
+    "drake": "this is a Drake file; convert the file to a URDF first",
 }
 
 
@@ -742,7 +742,7 @@ class JointReader:
             add(BAD_QUATERNION, "the quaternion has no direction", 'the identity is "0 0 0 1"')
         else:
             joint.quaternion = quaternion
-            message = "quat_xyzw is used, but most readers ignore it"
+            message = "urdfkin uses quat_xyzw, but most readers ignore this rotation"
             add(QUATERNION, message, "write the rotation as rpy for these readers")
 
     def _axis(self, joint: JointRecord) -> None:

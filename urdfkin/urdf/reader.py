@@ -121,7 +121,7 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
         while name in rules and name not in resolved:
             rule = pending[name] = rules[name]
             if rule.leader not in names:
-                where = f"joint {name} (mimic=False, --no-mimic, lets it move freely)"
+                where = f"joint {name} (mimic=False, --no-mimic, lets the joint move freely)"
                 raise UnknownNameError("mimicked joint", str(rule.leader), names, where=where)
             if rule.leader in pending:
                 raise InputError("mimic joints follow each other in a circle", where=f"joint {start}")

@@ -329,9 +329,8 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
 def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
     """Return the prims that have each variant set, including prims inside instances."""
     sets: dict[str, list[Any]] = {}
-    for prim in pxr.Usd.PrimRange.Stage(
-        stage, pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
-    ):
+    every = pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
+    for prim in pxr.Usd.PrimRange.Stage(stage, every):
         for one in prim.GetVariantSets().GetNames():
             sets.setdefault(one, []).append(prim)
     return sets
@@ -348,6 +347,7 @@ class _Edge:
     """A joint prim.
 
     Attributes:
+        name: The name of the prim, and then the unique name of the joint in the tree.
         ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in these bodies.
         size: See `JointReading`.
@@ -882,15 +882,15 @@ class _StageReader:
                     self._report_loop(edge)
                     continue
                 reached.add(there)
+                edge.name = unique(edge.name, self._joint_names)
                 ordered.append((edge, backwards))
                 open_.append(there)
         links: dict[str | None, str] = {None: unique("world", self._link_names)} if root is None else {}
         for path in [root, *(edge.ends[0 if back else 1] for edge, back in ordered)]:
             if path is not None:
                 links[path] = unique(self._short(path), self._link_names)
-        names = {edge.path: unique(edge.name, self._joint_names) for edge, _ in ordered}
-        rows = [row for edge, back in ordered for row in self._joints(edge, names, links, backwards=back)]
-        rules = dict(self._mimics([edge for edge, _ in ordered], names))
+        rows = [row for edge, back in ordered for row in self._joints(edge, links, backwards=back)]
+        rules = dict(self._mimics([edge for edge, _ in ordered]))
         rows = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in rows]
         for edge, _ in ordered:
             if self._is_outside(edge, group):
@@ -935,13 +935,13 @@ class _StageReader:
         return parts[-1]
 
     def _joints(
-        self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
+        self, edge: _Edge, links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
         """Yield the joint with its two links, and a fixed joint if the child frame is not on the axis."""
         (A, B), (parent, child), axis, kind = edge.frames, edge.ends, edge.axis, edge.kind
         if backwards:
             A, B, parent, child, axis = B, A, child, parent, -axis
-        name, here, there = names[edge.path], links[parent], links[child]
+        name, here, there = edge.name, links[parent], links[child]
         mimic_error = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
         lever = float(np.linalg.norm(B[:3, 3]))
         self._single[name] = *edge.rounded, edge.size, mimic_error, lever
@@ -985,7 +985,7 @@ class _StageReader:
         turns = edge.kind is JointKind.REVOLUTE
         if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
-            what = f"the limits of this joint are {words}: they are probably radians"
+            what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
             what = f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m"
@@ -1025,7 +1025,7 @@ class _StageReader:
 
     # -- mimic joints --------------------------------------------------------------------------------
 
-    def _mimics(self, edges: Sequence[_Edge], names: Mapping[str, str]) -> Iterator[tuple[str, Mimic]]:
+    def _mimics(self, edges: Sequence[_Edge]) -> Iterator[tuple[str, Mimic]]:
         """Yield the name and the rule of each mimic joint, with chains of rules resolved."""
         by_path = {edge.path: edge for edge in edges}
         rules: dict[str, Mimic] = {}
@@ -1043,7 +1043,7 @@ class _StageReader:
                     rules[edge.path] = rule
         for path in rules:
             rule = resolve(rules, path)
-            yield names[path], replace(rule, leader=names[rule.leader])
+            yield by_path[path].name, replace(rule, leader=by_path[rule.leader].name)
 
     def _rules(self, edge: _Edge) -> Iterator[Mimic]:
         """Yield each mimic rule of a joint, with the path of the mimicked joint, in rad or m."""
@@ -1109,7 +1109,7 @@ class _StageReader:
                 S = J[:3, :3] - J[:3, :3].T
                 sine = float(edge.axis @ np.array([S[2, 1], S[0, 2], S[1, 0]])) / 2.0
                 values[edge.path] = math.atan2(sine, (float(np.trace(J[:3, :3])) - 1.0) / 2.0)
-        by_name = {edge.name: edge.path for edge in group.edges}
+        by_name = {edge.name: edge.path for edge in group.edges if edge.path in self._read}
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.kind is JointKind.FLOATING:
                 q[at + 6] = 1.0

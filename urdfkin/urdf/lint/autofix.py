@@ -89,10 +89,8 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
     # Codes with more findings than a reporter stores are left out.
     # After a fix, the reporter can store another of these findings, which would then look new.
     many = {finding.code for finding in before.findings if finding.also}
-    old, new = (
-        Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
-        for seen in (before, after)
-    )
+    old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
+    new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
     if appeared := new - old:
         yield f"the fix would cause {min(code for code, *_ in appeared)}"
     if sum(f.count for f in before.findings) - sum(f.count for f in after.findings) < len(fixable):
@@ -167,7 +165,6 @@ def _rule(joint: JointRecord) -> tuple[str, float, float] | None:
 _IN_A_LINE = 52
 #: Letters for the number of bytes in a line of git's binary patch.
 _COUNTS = string.ascii_uppercase + string.ascii_lowercase
-_NO_END = "\\ No newline at end of file\n"
 
 
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
@@ -198,7 +195,8 @@ def _unified_diff(name: str, before: bytes, after: bytes) -> str:
     # Like git, StringIO ends a line only at a line feed.
     a, b = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))
     found = difflib.unified_diff(a, b, old, new)
-    return "".join(line if line.endswith("\n") else f"{line}\n{_NO_END}" for line in found)
+    no_end = "\n\\ No newline at end of file\n"
+    return "".join(line if line.endswith("\n") else line + no_end for line in found)
 
 
 def _quote(name: str) -> str:

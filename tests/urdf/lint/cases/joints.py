@@ -65,7 +65,7 @@ CASES = [
     Case("limit-only-upper", bounds('upper="1"'), ACCEPT),
     Case("limit-neither", limit('effort="1" velocity="1"'), WARN, "URDF508:6"),
     Case("limit-negative-effort", limit('lower="-1" upper="1" effort="-1" velocity="1"'), WARN, "URDF509:6"),
-    # Followers.
+    # Mimic joints.
     Case("mimic-unknown", arm(follow='<mimic joint="j9"/>'), REJECT, "URDF520:7"),
     Case("mimic-a-link", arm(follow='<mimic joint="l1"/>'), REJECT, "URDF520:7"),
     Case("mimic-circle", arm(inside='<mimic joint="j2"/>', follow=_MIMIC), REJECT, "URDF521:6 URDF521:7"),

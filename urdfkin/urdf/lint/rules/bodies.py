@@ -102,7 +102,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
         found = f"{small:.3g}, {middle:.3g} and {large:.3g}"
     else:
         return
-    remedy = "check the units and signs of the moments; kinematics does not use them"
+    remedy = "check the units and signs of the moments; kinematics does not use moments of inertia"
     report.add(INERTIAL_IMPOSSIBLE, f"no body has this inertia: {what}", tensor, found=found, remedy=remedy)
 
 

@@ -47,7 +47,9 @@ def check_dialect(report: Reporter, root: Element) -> None:
     if name is None:
         report.add(parser.MISSING_NAME, "the robot has no name", root, remedy='write <robot name="...">')
     elif not name.strip():
-        report.add(ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give it a name")
+        report.add(
+            ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give the robot a name"
+        )
     if not root.all("link"):
         srdf = any(child.tag in _SRDF for child in root.children)
         remedy = "this is an SRDF; pass the URDF of the robot" if srdf else "a robot has at least one <link>"
@@ -56,7 +58,7 @@ def check_dialect(report: Reporter, root: Element) -> None:
 
 def _check_namespaces(report: Reporter, root: Element) -> None:
     if "xmlns" in root.attributes:
-        message = "xmlns puts the elements into a namespace, where most readers do not find them"
+        message = "xmlns puts the elements into a namespace, so most readers do not find the elements"
         found = quoted(root.attributes["xmlns"])
         report.add(NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
     namespaces = {
