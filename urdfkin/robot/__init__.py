@@ -512,8 +512,7 @@ class Robot(Displayable):
             ) from None
 
     def limit_violations(self, q: Given) -> list[str]:
-        """Return one line for each joint that is outside the joint's limits in a configuration of `q` (...,
-        nq).
+        """Return a line for each joint that exceeds a limit in some configuration of `q` (..., nq).
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
