@@ -6,6 +6,7 @@ import pickle
 import re
 import shlex
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,7 @@ def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(roundings, "ROUNDINGS", 1e-9)
 
 
+HAND = "panda_hand"
 METHODS = ["placement", "velocity", "jacobian", "jacobian_rate", "hessian", "acceleration"]
 
 
@@ -173,35 +175,38 @@ def test_what_is_no_numbers_is_refused(panda: Robot, value: Any) -> None:
         panda.from_pinocchio(value)
 
 
-def test_a_wrong_length_names_the_joints_and_pinocchios_numbers_must_be_finite(panda: Robot) -> None:
-    with pytest.raises(InputError, match=r"q needs 8 numbers for panda: panda_joint1, .*found shape \(7,\)"):
-        panda.placement(np.zeros(7), "panda_hand")
-    with pytest.raises(InputError, match=r"a needs 8 numbers for panda: panda_joint1"):
-        panda.acceleration(np.zeros(8), np.zeros(8), np.zeros((3, 9)), "panda_hand")
-    with pytest.raises(InputError, match="none, no joint moves"):
-        urdfkin.load(urdf_of("single_link")).placement([1.0], "base")
-    with pytest.raises(InputError, match="wrong length"):
-        panda.from_pinocchio(np.zeros(8))
-    for bad in (np.nan, np.inf, -np.inf):
-        with pytest.raises(InputError, match="finite"):
-            panda.from_pinocchio(np.full(9, bad))
+Z = np.zeros
+REFUSED: list[tuple[Callable[[Robot], object], str]] = [
+    (lambda x: x.placement(Z(7), HAND), r"q needs 8 numbers for panda: panda_joint1, .*found shape \(7,\)"),
+    (lambda x: x.acceleration(Z(8), Z(8), Z((3, 9)), HAND), "a needs 8 numbers for panda: panda_joint1"),
+    (lambda x: urdfkin.load(urdf_of("single_link")).placement([1.0], "base"), "none, no joint moves"),
+    (lambda x: x.from_pinocchio(Z(8)), "wrong length"),
+    *((lambda x, bad=bad: x.from_pinocchio(np.full(9, bad)), "finite") for bad in (np.nan, np.inf, -np.inf)),
+    (lambda x: x.velocity(Z((2, 8)), Z((3, 8)), HAND), r"do not broadcast: found \(2,\), \(3,\)"),
+    (
+        lambda x: x.placement(Z((2, 8)), HAND, base=BaseMotion(velocity=Z((4, 6)))),
+        r"do not broadcast: found \(2,\), \(4,\)",
+    ),
+    *(
+        (lambda x, frame=frame: x.jacobian(x.neutral(), frame), "a frame must be the name of a link or joint")
+        for frame in (3, b"panda_hand", ["panda_hand", 3], iter(["panda_hand"]))
+    ),
+    (lambda x: x.placement(Z(8), HAND, base={}), "base must be a BaseMotion or None: found dict"),  # type: ignore[arg-type]
+]
 
 
-def test_batches_that_do_not_fit_are_refused_with_their_shapes(panda: Robot) -> None:
-    with pytest.raises(InputError, match=r"do not broadcast: found \(2,\), \(3,\)"):
-        panda.velocity(np.zeros((2, 8)), np.zeros((3, 8)), "panda_hand")
-    base = BaseMotion(velocity=np.zeros((4, 6)))
-    with pytest.raises(InputError, match=r"do not broadcast: found \(2,\), \(4,\)"):
-        panda.placement(np.zeros((2, 8)), "panda_hand", base=base)
+@pytest.mark.parametrize(("compute", "message"), REFUSED)
+def test_a_wrong_argument_is_refused_with_what_is_wrong(
+    panda: Robot, compute: Callable[[Robot], object], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        compute(panda)
 
 
-def test_a_frame_that_does_not_exist_offers_the_nearest_and_what_is_no_name_is_refused(panda: Robot) -> None:
+def test_a_frame_that_does_not_exist_offers_the_nearest(panda: Robot) -> None:
     with pytest.raises(UnknownNameError, match="unknown frame 'hand'; did you mean panda_hand") as caught:
         panda.jacobian(panda.neutral(), "hand")
-    assert caught.value.nearest[0] == "panda_hand"
-    for frame in (3, b"panda_hand", ["panda_hand", 3], iter(["panda_hand"])):
-        with pytest.raises(InputError, match="a frame must be the name of a link or joint"):
-            panda.jacobian(panda.neutral(), frame)  # type: ignore[arg-type]
+    assert caught.value.nearest[0] == HAND
 
 
 def test_a_reference_is_a_member_or_its_name_in_either_case(panda: Robot) -> None:
@@ -240,8 +245,6 @@ def test_a_base_that_is_none_is_refused() -> None:
     ):
         with pytest.raises(InputError, match=message):
             BaseMotion(**words)
-    with pytest.raises(InputError, match="base must be a BaseMotion or None: found dict"):
-        urdfkin.load("ur5").placement(np.zeros(6), "tool0", base={})  # type: ignore[arg-type]
 
 
 def test_a_base_is_read_only_and_comes_back_from_a_pickle() -> None:

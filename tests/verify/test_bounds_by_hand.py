@@ -177,7 +177,7 @@ def test_a_tilt_adds_twice_itself_to_each_factor(plan: CompiledTree) -> None:
 
 def test_mujocos_levers_are_twice_as_long_and_its_roundings_two_and_a_half_times_as_many() -> None:
     lever = 2.0 * P
-    assert bounds.about_the_root(sizes()) == Magnitudes(
+    assert bounds.mujoco_magnitudes(sizes()) == Magnitudes(
         p=np.array([[lever]]),
         w=np.array([[W]]),
         vel=np.array([[VEL + W * lever]]),

@@ -75,7 +75,7 @@ def planted(robot: Robot, method: str, place: int, by: float) -> Any:
         result.flat[place] = x + (by if x <= 0.0 else -by) if by else np.nextafter(x, np.inf)
         return result
 
-    return robot.verifier.checked(method, wrong, plan, frame, Reference.LOCAL_WORLD_ALIGNED)
+    return robot.verifier.with_check(method, wrong, plan, frame, Reference.LOCAL_WORLD_ALIGNED)
 
 
 def bound_of_one(robot: Robot, quantity: Quantity, inputs: tuple[FloatArray, ...]) -> FloatArray:

@@ -57,7 +57,7 @@ from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
-from urdfkin.verify.verifier import checked_choice
+from urdfkin.verify.verifier import as_verify
 
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
@@ -455,7 +455,7 @@ class Comparator:
         self, alignment: Alignment, variables: Variables, frames: tuple[Interval, ...]
     ) -> Confirmation:
         """Check the bounds with Pinocchio, which reads the texts of A and B with its own parser."""
-        if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
+        if not all(as_verify(robot.verifier.policy) for robot in self.robots):
             return Confirmation("not asked", reason="loaded with verify=False")
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:

@@ -26,7 +26,7 @@ from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.lazy_import import own_version
-from urdfkin.verify.bounds import DecimalErrors, against_true_values
+from urdfkin.verify.bounds import DecimalErrors, true_value_magnitudes
 from urdfkin.verify.call import Call, Part
 from urdfkin.verify.certificate import Certificate
 from urdfkin.verify.exact.numbers import (
@@ -208,7 +208,7 @@ def _vectors(
 def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
     """Return the error bounds k * scale of a function's results (n, numbers), in eps, and the scales."""
     v, a = (*part.rates, None, None)[:2]
-    size = against_true_values(part.plan, part.q, v, a, errors)
+    size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
     scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
     shape = (n, 1, *function.shape)

@@ -1,7 +1,7 @@
 """The class `Robot`: kinematics of a loaded robot, with every result checked against Pinocchio.
 
 Equation numbers refer to chapter 7 of the textbook in `docs/equations.md`. With `verify=True`, the default, a
-method compares its result with Pinocchio's before it returns.
+method compares each result with Pinocchio's before returning the result.
 """
 
 from __future__ import annotations
@@ -512,7 +512,7 @@ class Robot(Displayable):
             ) from None
 
     def limit_violations(self, q: Given) -> list[str]:
-        """Return one line for each joint that is outside its limits in some configuration of `q` (..., nq).
+        """Return a line for each joint that exceeds a limit in some configuration of `q` (..., nq).
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
@@ -914,6 +914,8 @@ class Robot(Displayable):
         7.126 is the sum of H[..., j] v[j] over j. v^T H v is the part of the acceleration that depends on v
         alone.
 
+        Linear part of H[..., i, j] for revolute joints in LOCAL_WORLD_ALIGNED:
+
         - Joint j before joint i: z_j rotates the column, z_j x (z_i x d_i).
         - Joint j after joint i: z_j moves the end of the lever arm, z_i x (z_j x d_j).
 
@@ -1250,7 +1252,7 @@ class Robot(Displayable):
     ) -> PreparedFrame:
         """Return a fast evaluator of one frame, for one configuration per call.
 
-        `PreparedFrame` lists its methods.
+        `PreparedFrame` lists the methods of the evaluator.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.

@@ -26,7 +26,7 @@ from urdfkin.urdf.reader import read_tree
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, entry_of, is_urdf_path, is_usd, read_source
 from urdfkin.urdf.writer import to_urdf as write_urdf
 from urdfkin.verify.oracles import OracleName, oracle_library
-from urdfkin.verify.verifier import Verify, checked_choice
+from urdfkin.verify.verifier import Verify, as_verify
 
 if TYPE_CHECKING:
     from urdfkin.dh.screws import ProductOfExponentials
@@ -187,7 +187,7 @@ def _load_table(
             warnings.warn(f"{name}: {warning}", UrdfWarning, stacklevel=3)
     text = Text(urdf.encode(), name, name)
     robot = robot_of(text, **how, made=True, table=True)
-    if checked_choice(how["verify"]):
+    if as_verify(how["verify"]):
         verifier = _plain(robot, text).verifier
         if isinstance(table, ProductOfExponentials):
             check_screws(verifier, table)
@@ -208,7 +208,7 @@ def _load_mjcf(
     from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
 
     _refuse_arguments(xacro_args, "MJCF")
-    wanted = bool(checked_choice(how["verify"]))
+    wanted = bool(as_verify(how["verify"]))
     data = _bytes_of_mjcf(source)
     digest = hashlib.sha256(data).hexdigest()
     read = read_mjcf(source, check=wanted)
@@ -238,7 +238,7 @@ def _load_usd(
     variants = tuple((as_str(name, "variant"), as_str(one, "variant")) for name, one in variant.items())
     if articulation is not None:
         as_str(articulation, "articulation")
-    wanted = bool(checked_choice(how["verify"]))
+    wanted = bool(as_verify(how["verify"]))
     read = read_usd(source, variants=variants, articulation=articulation)
     data = read_bytes(Path(read.path))
     digest = hashlib.sha256(data).hexdigest()
@@ -288,7 +288,7 @@ def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unp
     read = tree_of_model(source)
     text = Text(write_urdf(read.tree).encode(), "<pinocchio.Model>", "<pinocchio.Model>")
     robot = robot_of(text, **how, made=True)
-    if checked_choice(how["verify"]):
+    if as_verify(how["verify"]):
         verifier = _plain(robot, text, made=True).verifier
         robot.verifier.reading = check_model_source(verifier, read, source)
     return robot

@@ -34,7 +34,7 @@ from urdfkin.system.lazy_import import lazy_import
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import UrdfWarning
-from urdfkin.verify.bounds import against_true_values
+from urdfkin.verify.bounds import true_value_magnitudes
 from urdfkin.verify.exact.numbers import (
     DIGITS,
     conversion,
@@ -413,7 +413,7 @@ def _results(
         link = tree.frame_link(frame)
         plan, path = robot.plan((link,)), tree.path(link)
         rows = q[np.newaxis], v[np.newaxis], a[np.newaxis]
-        size = against_true_values(plan, *rows, conversion(robot.urdf, tree, path, rows[0]))
+        size = true_value_magnitudes(plan, *rows, conversion(robot.urdf, tree, path, rows[0]))
         with precision(digits):
             motion = move(tree, read_exact(robot.urdf, tree, path), q, v, a)
             for row in QUANTITIES:

@@ -308,7 +308,7 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
 
 
 @_BEYOND
-def about_the_root(size: Magnitudes) -> Magnitudes:
+def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     """Return the magnitudes for a comparison of urdfkin with MuJoCo.
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass, which
@@ -345,7 +345,7 @@ class DecimalErrors(NamedTuple):
     lengths: FloatArray
 
 
-def against_true_values(
+def true_value_magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: DecimalErrors
 ) -> Magnitudes:
     """Return the magnitudes for a comparison of one program's results with the true values.
@@ -606,7 +606,7 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
 
-def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
+def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the limit of |qw| below which rounding can change the sign of qw.
 
     The limit is 1.5 k eps = 3 delta, above the error 2.3 delta of `quaternion_jacobian_bound`.

@@ -47,7 +47,7 @@ def check_analytical_jacobian(
         # q and -q are the same rotation; urdfkin and the oracle return the quaternion with qw >= 0.
         # If |qw| is below the rounding error, the sign of urdfkin's quaternion is accepted.
         opposite = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
-        flipped = opposite & (np.abs(quat[..., 3]) <= bounds.hidden_scalar(bound, quat.shape[:-1]))
+        flipped = opposite & (np.abs(quat[..., 3]) <= bounds.sign_limit(bound, quat.shape[:-1]))
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]
         return theirs, bound
     R = oracle.placements(x.query)[..., :3, :3]

@@ -30,7 +30,7 @@ from urdfkin.system.files import at_home
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.mjcf import Listed, is_text, name_of
 from urdfkin.urdf.mujoco import version
-from urdfkin.verify.bounds import Bound, about_the_root, magnitudes, mjcf_placement_bound, result_k
+from urdfkin.verify.bounds import Bound, magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
 from urdfkin.verify.comparison import worst_of_each
 from urdfkin.verify.mjcf_process import MOST, parse_answers, unpacked
 from urdfkin.verify.quantities import PLACEMENT
@@ -136,7 +136,7 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     # The factor 2 doubles the bound to allow for the rounded angles in the URDF text.
-    size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
+    size = mujoco_magnitudes(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
     bound = mjcf_placement_bound(bound, unpacked(answer["lengths"]), unpacked(answer["angles"]))

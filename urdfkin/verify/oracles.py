@@ -63,7 +63,7 @@ MUJOCO = OracleLibrary(
     "mujoco",
     lazy_import("urdfkin.urdf.mujoco:version"),
     lazy_import("urdfkin.verify.mujoco:MujocoOracle"),
-    lazy_import("urdfkin.verify.bounds:about_the_root"),
+    lazy_import("urdfkin.verify.bounds:mujoco_magnitudes"),
 )
 ORACLES: dict[str, OracleLibrary] = {oracle.name: oracle for oracle in (PINOCCHIO, MUJOCO)}
 

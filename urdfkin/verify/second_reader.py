@@ -110,7 +110,7 @@ def second_reading(
                 faults.setdefault(fault, []).append(name)
             else:
                 differences.append(f"joint {name}: {what}")
-    known = [f"{fault}: {_listed(sorted(names))}" for fault, names in sorted(faults.items())]
+    known = [f"{fault}: {', '.join(_shortened(sorted(names)))}" for fault, names in sorted(faults.items())]
     return SecondReading(by, len(ours), tuple(_shortened(sorted(differences))), tuple(known))
 
 
@@ -150,9 +150,9 @@ def _differences(
         elif abs(length - 1.0) > _UNIT:
             yield "axis", "does not normalise an axis"
     if joint.kind is not JointKind.FIXED:
-        found, own = _limit(theirs), _own_limit(joint)
-        if found != own:
-            yield f"limit {found}, not {own}", ""
+        limit = joint.limit and {x: getattr(joint.limit, x) for x in (*_LOWER_UPPER, *_VELOCITY_EFFORT)}
+        if (found := _limit(theirs)) != limit:
+            yield f"limit {found}, not {limit}", ""
     if mimic and rule != joint.mimic:
         yield f"mimic rule {rule}, not {joint.mimic}", ""
 
@@ -166,11 +166,6 @@ def _limit(joint: yourdf.Joint) -> dict[str, float] | None:
     others = {x: getattr(joint.limit, x) for x in _VELOCITY_EFFORT}
     endless = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
     return {x: endless[x] if value is None else value for x, value in {**bounds, **others}.items()}
-
-
-def _own_limit(joint: Joint) -> dict[str, float] | None:
-    limit = joint.limit
-    return None if limit is None else {x: getattr(limit, x) for x in (*_LOWER_UPPER, *_VELOCITY_EFFORT)}
 
 
 def _rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
@@ -206,7 +201,3 @@ def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[st
 def _shortened(differences: list[str]) -> list[str]:
     more = len(differences) - _LISTED
     return differences if more <= 0 else [*differences[:_LISTED], f"{more} more"]
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(_shortened(names))

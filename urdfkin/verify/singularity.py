@@ -237,7 +237,8 @@ class _Explanation:
         reason = None
         if None not in turns:
             if self._angular_only:
-                reason = self._of_angular_rows(one)
+                parallel = np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1
+                reason = f"The axes of {self._joints(one)} are parallel{'' if parallel else ' to one plane'}."
             elif self._linear_only:
                 reason = self._of_linear_rows(one, turns)
             elif all(turns):
@@ -250,11 +251,6 @@ class _Explanation:
         motion = np.zeros(len(self._names))
         motion[list(one)] = Vt[-1]
         return self._null_motion(motion)
-
-    def _of_angular_rows(self, one: tuple[int, ...]) -> str | None:
-        if np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1:
-            return f"The axes of {self._joints(one)} are parallel."
-        return f"The axes of {self._joints(one)} are parallel to one plane."
 
     def _of_linear_rows(self, one: tuple[int, ...], turns: list[bool | None]) -> str | None:
         frame = self._columns.frame

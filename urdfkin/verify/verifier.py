@@ -98,7 +98,7 @@ class Verifier:
         oracle: OracleName = "pinocchio",
     ) -> None:
         self.text, self.tree, self.origin = text, tree, origin
-        self.policy, self.mimic, self.unverifiable = checked_choice(policy), mimic, unverifiable
+        self.policy, self.mimic, self.unverifiable = as_verify(policy), mimic, unverifiable
         self.library = oracle_library(oracle)
         self.ledger, self.reading = Ledger(), ""
         self._oracles: dict[tuple[str, bool], Oracle] = {}
@@ -175,7 +175,7 @@ class Verifier:
 
     def policy_of_call(self, verify: Verify | None) -> Verify:
         """Return the valid value of the argument `verify` of a call; None becomes the robot's `policy`."""
-        return checked_choice(self.policy if verify is None else verify)
+        return as_verify(self.policy if verify is None else verify)
 
     def require_pinocchio(self, verify: Verify | None) -> None:
         """Raise InstallationError if a check of the call needs Pinocchio, and Pinocchio is missing."""
@@ -232,7 +232,7 @@ class Verifier:
         if left := call.results - total.results:
             ledger.unchecked(quantity.name, left, f'verify="sample" checks {SAMPLE} configurations of a call')
 
-    def checked(
+    def with_check(
         self,
         name: str,
         compute: Callable[..., FloatArray | None],
@@ -467,7 +467,7 @@ def _warn(reason: str) -> None:
     warn_caller(f"not verified: {reason}", NotVerifiedWarning)
 
 
-def checked_choice(verify: object) -> Verify:
+def as_verify(verify: object) -> Verify:
     """Return a valid value of `verify`; raise InputError for other values."""
     if verify is True or verify is False:
         return verify

@@ -62,10 +62,6 @@ def test_the_squares_of_a_roots_ends_lie_on_either_side(digits: int, x: float) -
     assert high - low <= high * WIDTH[digits]
 
 
-def test_the_root_of_a_square_is_exact() -> None:
-    assert true_ends(exact(25.0).sqrt()) == (Fraction(5), Fraction(5))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("digits", DIGITS)
 @given(angle=st.one_of(finite, st.floats(-7.0, 7.0), st.integers(-9, 9).map(lambda k: k * math.pi / 2)))
@@ -93,16 +89,6 @@ def test_what_taylors_series_leaves_out_is_in_the_intervals(exponent: int, digit
     assert sine[1] > x - x**3 / 6
     assert cosine[0] < 1 - x**2 / 2 + x**4 / 24
     assert cosine[1] > 1 - x**2 / 2
-
-
-@pytest.mark.parametrize("word", ["0.1", "-1.5708", "3.14159265358979", "100.7", "0"])
-def test_cosine_and_sine_of_a_wide_interval_hold_those_of_all_that_is_in_it(word: str) -> None:
-    context = independent.clone()
-    sine, cosine = map(true_ends, (arb(word) + arb(0, 0.01)).sin_cos())
-    for step in range(-10, 11):
-        angle = context.mpf(word) + context.mpf(step) / 1000
-        assert cosine[0] <= fraction(context.cos(angle)) <= cosine[1]
-        assert sine[0] <= fraction(context.sin(angle)) <= sine[1]
 
 
 def nearest(M: FloatArray, digits: int) -> Matrix:

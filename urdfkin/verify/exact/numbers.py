@@ -216,7 +216,7 @@ def read_exact(
 
 
 def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
-    """Return the errors of converting a URDF's decimals to doubles, for `against_true_values`.
+    """Return the errors of converting a URDF's decimals to doubles, for `true_value_magnitudes`.
 
     `path` contains the indices of the joints of a frame's path, from the root; q has the shape (n, nq).
     """
