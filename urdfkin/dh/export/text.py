@@ -61,7 +61,7 @@ def constant_of(row: DHRow) -> float:
     return cell + row.sense * row.mimic.offset if row.mimic else cell
 
 
-def added(variable: str, constant: str) -> str:
+def format_sum(variable: str, constant: str) -> str:
     """Format `variable + constant` without zero terms and double signs."""
     if constant == "0":
         return variable
@@ -73,9 +73,9 @@ def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any
     q = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
     if row.kind.turns:
-        theta = added(q, units.angle(constant_of(row), pi))
+        theta = format_sum(q, units.angle(constant_of(row), pi))
     else:
-        d = added(q, units.length(constant_of(row)))
+        d = format_sum(q, units.length(constant_of(row)))
     named = {"a": units.length(row.a), "alpha": units.angle(row.alpha, pi), "d": d, "theta": theta}
     texts = [named[name] for name in units.columns]
     return [*texts, units.angle(row.beta, pi)] if table.has_hayati_rows else texts
