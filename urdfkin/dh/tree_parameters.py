@@ -83,7 +83,7 @@ class TreeParameters:
     """The table of a whole robot, with a row for each joint, including fixed joints.
 
     Attributes:
-        path_lengths: (joints,) path length (metres) from the root to each joint: the sum of the URDF's offsets.
+        path_lengths: (joints,) sum of the URDF's offsets (metres) from the root to each joint.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
         left_out: Largest sum (rad), over the paths from the root, of the tilts that are replaced by zero as
             rounding errors (`urdfkin.dh.common_normals`).
