@@ -12,8 +12,8 @@ from urdfkin.cli.output import Answer, check_of_path
 from urdfkin.cli.streams import say
 from urdfkin.dh import DHTable, Units, export, read_table, to_convention
 from urdfkin.dh.compare import (
-    CellDifference,
     BetterInterpretation,
+    CellDifference,
     Mistake,
     TableComparison,
     compare,
@@ -244,7 +244,9 @@ def _frame_of_robot(work: Work, name: object) -> str | None:
     return name if isinstance(name, str) and name in work.robot.frame_names else None
 
 
-def _comparison(found: TableComparison, reference: DHTable, slip: BetterInterpretation | None) -> dict[str, Any]:
+def _comparison(
+    found: TableComparison, reference: DHTable, slip: BetterInterpretation | None
+) -> dict[str, Any]:
     return {
         "passes": found.passes,
         "agrees": found.agrees,
